@@ -15,7 +15,7 @@ import sys
 import threading
 
 from webmap.agents.gates import Gates
-from webmap.agents.link import AgentLane
+from webmap.agents.link import AgentConnection
 from webmap.agents.peer import close_peers
 from webmap.base.tasks import LoopThread
 from webmap.gate.protocol import RobotSpec
@@ -30,7 +30,7 @@ def main(agent: str, pages: int) -> None:
         for op in subscriptions:
             lane.send(json.dumps(op).encode())
 
-    lane = AgentLane(
+    lane = AgentConnection(
         agent,
         opened=subscribe,
         received=lambda _: arrived.set(),

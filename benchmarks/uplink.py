@@ -27,7 +27,8 @@ from websockets.exceptions import ConnectionClosed
 from benchmarks.harness import Comparison, Contender, Figures, compare
 from benchmarks.line import Line
 from benchmarks.processes import started, used
-from webmap.agents.peer import Peer, User
+from webmap.agents.peer import Peer
+from webmap.agents.router_access import RouterUser
 from webmap.base.tasks import LoopThread
 
 ROBOTS = 20
@@ -169,7 +170,7 @@ def watched_by(
                 nonlocal counted
                 counted += 1
 
-            peer = Peer(router, User())
+            peer = Peer(router, RouterUser())
             running.callback(peer.close)
             peer.start()
             peer.listen("webmap/bay3/topics/**", count)

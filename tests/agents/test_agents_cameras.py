@@ -4,42 +4,47 @@ import msgspec
 import pytest
 
 from camera_server import a_jpeg
-from webmap.agents import looks
+from webmap.agents import camera_messages
 from webmap.agents.address import Sender, camera_key
-from webmap.agents.cameras import (
+from webmap.agents.agent_cameras import (
     AHEAD,
-    LOOKED,
+    EXPIRY,
     MOST_DISPLAYS,
     PATIENCE,
-    Cameras,
-    HeldCamera,
-    cameras_in,
+    CameraRelay,
+    CameraSource,
+    cameras_of,
 )
-from webmap.agents.far_camera import FarCamera
-from webmap.agents.looks import AgentClock, CameraPicture, Look, LookAway
+from webmap.agents.camera_messages import (
+    AgentClock,
+    CameraRelease,
+    CameraRequest,
+    PictureMessage,
+)
+from webmap.agents.remote_camera import RemoteCamera
 from webmap.base.errors import ConfigError, WireError
 from webmap.config.robot import RobotConfig
 from webmap.ros.messages_image import MAX_BYTES
 
 ANN, BEN = Sender("ann", "4f"), Sender("ben", "5e")
 FRONT = ("r1", "Front")
-HELD = HeldCamera("http://cam/stream", 200)
+HELD = CameraSource("http://cam/stream", 200)
 PICTURE = a_jpeg()
 
 
 class Bench:
     def __init__(self):
         self.fetched, self.sent, self.answers = [], [], []
-        self.cameras = Cameras(
+        self.cameras = CameraRelay(
             begin=lambda name, camera: self.fetched.append(name),
             end=self.fetched.remove,
             send=lambda name, picture: self.sent.append(picture),
             answer=lambda client, looked: self.answers.append((client, looked)),
         )
-        self.cameras.hold({FRONT: HELD})
+        self.cameras.set_cameras({FRONT: HELD})
 
     def look(self, client, now=0.0, newest=0, name=FRONT):
-        self.cameras.receive(client, Look(1, *name, newest), now)
+        self.cameras.receive(client, CameraRequest(1, *name, newest), now)
 
     def picture(self, now=0.0, data=PICTURE):
         self.cameras.picture(FRONT, data, now)
@@ -59,22 +64,22 @@ def test_a_camera_is_fetched_once_while_any_display_looks(bench):
     bench.look(ANN)
     bench.look(BEN)
     assert bench.fetched == [FRONT]
-    bench.cameras.receive(ANN, LookAway(*FRONT), 1.0)
+    bench.cameras.receive(ANN, CameraRelease(*FRONT), 1.0)
     assert bench.fetched == [FRONT]
-    bench.cameras.receive(BEN, LookAway(*FRONT), 1.0)
+    bench.cameras.receive(BEN, CameraRelease(*FRONT), 1.0)
     assert bench.fetched == []
     bench.picture()
     bench.cameras.complain(FRONT, "it is late")
-    bench.cameras.receive(BEN, LookAway(*FRONT), 1.0)
+    bench.cameras.receive(BEN, CameraRelease(*FRONT), 1.0)
     assert bench.sent == []
 
 
 def test_a_display_that_is_gone_looks_no_more(bench):
     bench.look(ANN)
     bench.look(BEN, 3.0)
-    bench.cameras.look(LOOKED + 1.0)
+    bench.cameras.check(EXPIRY + 1.0)
     assert bench.fetched == [FRONT]
-    bench.cameras.look(LOOKED + 3.1)
+    bench.cameras.check(EXPIRY + 3.1)
     assert bench.fetched == []
 
 
@@ -87,9 +92,9 @@ def test_a_camera_that_the_agent_does_not_have_is_not_fetched(bench, name):
 
 def test_a_changed_camera_ends_and_the_next_look_begins_the_new_one(bench):
     bench.look(ANN)
-    bench.cameras.hold({FRONT: HELD})
+    bench.cameras.set_cameras({FRONT: HELD})
     assert bench.fetched == [FRONT]
-    bench.cameras.hold({FRONT: HELD._replace(url="http://cam/other")})
+    bench.cameras.set_cameras({FRONT: HELD._replace(url="http://cam/other")})
     assert bench.fetched == []
     bench.look(ANN)
     assert bench.fetched == [FRONT]
@@ -166,11 +171,11 @@ def test_the_number_of_displays_at_a_camera_is_bounded(bench):
 def test_only_cameras_over_http_are_those_of_the_agent():
     cameras = [{"url": "http://me:secret@cam/a?b", "throttle": 50}, "/camera"]
     config = RobotConfig.from_dict({"name": "Bob", "cameras": cameras})
-    assert cameras_in([("r1", config)]) == {
-        ("r1", "Camera 1"): HeldCamera("http://me:secret@cam/a?b", 50)
+    assert cameras_of([("r1", config)]) == {
+        ("r1", "Camera 1"): CameraSource("http://me:secret@cam/a?b", 50)
     }
     config = RobotConfig.from_dict({"name": "Bob", "cameras": "https://cam/a"})
-    assert cameras_in([("r1", config)])["r1", "Camera"].throttle == 200
+    assert cameras_of([("r1", config)])["r1", "Camera"].throttle == 200
 
 
 @pytest.mark.parametrize(
@@ -181,24 +186,26 @@ def test_only_cameras_over_http_are_those_of_the_agent():
         b'{"type":"look","number":1,"robot":"r1"}',
         b'{"type":"look","number":"1","robot":"r1","camera":"Front"}',
         b'{"type":"fetch","url":"http://elsewhere"}',
-        msgspec.json.encode(Look(1, "r1", "x" * 5000)),
+        msgspec.json.encode(CameraRequest(1, "r1", "x" * 5000)),
     ],
 )
 def test_what_is_no_look_is_refused(piece):
-    with pytest.raises(WireError, match="got a look"):
-        looks.read_look(piece)
+    with pytest.raises(WireError, match="got a request"):
+        camera_messages.read_request(piece)
 
 
 def test_messages_about_cameras_are_read_as_they_were_written():
-    look = Look(3, "r1", "Front", 2)
-    assert looks.read_look(msgspec.json.encode(look)) == look
-    away = LookAway("r1", "Front")
-    assert looks.read_look(msgspec.json.encode(away)) == away
-    picture = CameraPicture(7, 1.5, b"data")
-    assert looks.read_picture(looks.pack_picture(picture)) == picture
-    looked = looks.Looked(3, 1.5, "why")
-    assert looks.read_looked(msgspec.json.encode(looked)) == looked
-    for read in (looks.read_picture, looks.read_looked):
+    look = CameraRequest(3, "r1", "Front", 2)
+    assert camera_messages.read_request(msgspec.json.encode(look)) == look
+    away = CameraRelease("r1", "Front")
+    assert camera_messages.read_request(msgspec.json.encode(away)) == away
+    picture = PictureMessage(7, 1.5, b"data")
+    assert (
+        camera_messages.read_picture(camera_messages.pack_picture(picture)) == picture
+    )
+    looked = camera_messages.CameraReply(3, 1.5, "why")
+    assert camera_messages.read_reply(msgspec.json.encode(looked)) == looked
+    for read in (camera_messages.read_picture, camera_messages.read_reply):
         with pytest.raises(WireError):
             read(b"short")
 
@@ -241,8 +248,8 @@ def test_looks_without_answers_are_forgotten():
 
 
 def test_a_camera_beside_an_agent_is_one_address_without_its_own():
-    camera = FarCamera("zenoh://hall/bay3", "r1", "Front & rear", "http://cam/a")
-    assert FarCamera.parse(camera.url) == camera
+    camera = RemoteCamera("zenoh://hall/bay3", "r1", "Front & rear", "http://cam/a")
+    assert RemoteCamera.parse(camera.url) == camera
     assert camera.shown == "http://cam/a through the agent bay3"
     assert camera_key("bay3", "r1", "a") != camera_key("bay3", "r1", "b")
 
@@ -257,4 +264,4 @@ def test_a_camera_beside_an_agent_is_one_address_without_its_own():
 )
 def test_an_address_without_robot_and_camera_is_refused(url):
     with pytest.raises(ConfigError, match="names no robot and camera"):
-        FarCamera.parse(url)
+        RemoteCamera.parse(url)

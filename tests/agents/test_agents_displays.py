@@ -7,9 +7,10 @@ import pytest
 from agent_reports import REPORT
 
 from webmap.agents import displays as displays_module
-from webmap.agents.agent_gate import AgentGate
-from webmap.agents.displays import Answer, Displays, Page, Took
-from webmap.agents.samples import Numbering, Order
+from webmap.agents import gate_messages
+from webmap.agents.displays import Displays
+from webmap.agents.gate_messages import Numbering, Order, PageState, SampleAck, StopAck
+from webmap.agents.gates import AgentGate
 from webmap.base.errors import WireError
 from webmap.gate import commands
 from webmap.gate.commands import Stop, Take
@@ -32,8 +33,8 @@ from webmap.gate.protocol import (
 
 PAGE = Connect("west/c1", "Ann", "operator")
 PROGRAM = Connect("west/program", "the program", "operator", program=True)
-ANN = Page("c1", "Ann", "operator")
-OWN = Page("program", "the program", "operator")
+ANN = PageState("c1", "Ann", "operator")
+OWN = PageState("program", "the program", "operator")
 STOP = b'{"op":"stop","robot":"*"}'
 STOP_R1 = b'{"op":"stop","robot":"r1"}'
 
@@ -53,13 +54,13 @@ class West:
 
     def connects(self, *pages, now=0.0, name="west"):
         numbering = None if name == "west" else Numbering()
-        return self.send(Answer(0, 0, pages), now, name, numbering)
+        return self.send(SampleAck(0, 0, pages), now, name, numbering)
 
     def receive(self, tick, now):
         self.order.take(self.displays.send(Tick(tick, {}), now))
 
     def answers(self, now, pages=None, reports=False):
-        answer = Answer(self.order.session or 0, self.order.newest, pages, reports)
+        answer = SampleAck(self.order.session or 0, self.order.newest, pages, reports)
         return self.send(answer, now)
 
     def reports_control_of(self, connection, now=0.0):
@@ -212,12 +213,12 @@ def test_the_program_of_a_silent_display_ends_after_half_a_second(west):
     west.reports_control_of("west/program")
     west.receive(1, 0.05)
     west.answers(0.1)
-    assert west.displays.look(0.55) == []
-    assert west.displays.look(0.56) == [Disconnect("west/program")]
-    assert west.displays.look(0.6) == []
+    assert west.displays.check(0.55) == []
+    assert west.displays.check(0.56) == [Disconnect("west/program")]
+    assert west.displays.check(0.6) == []
     assert west.send(from_program(velocity()), 0.7) == []
     west.reports_control_of("west/c1")
-    assert west.displays.look(1.06) == [Disconnect("west/c1")]
+    assert west.displays.check(1.06) == [Disconnect("west/c1")]
 
 
 def test_a_program_that_its_display_no_longer_lists_ends(west):
@@ -229,14 +230,14 @@ def test_the_role_is_that_of_the_user_and_counts_for_each_of_its_displays():
     displays = Displays({"": "viewer", "ann": "operator"})
     for user, role in (("ann", "operator"), ("bob", "viewer")):
         name = f"{user}.4f"
-        hello = Answer(0, 0, (Page("c1", "A page", "operator"),))
+        hello = SampleAck(0, 0, (PageState("c1", "A page", "operator"),))
         sample = Numbering().next(msgspec.msgpack.encode(hello))
         (got,) = displays.receive(name, sample, 0.0)
         assert got.role == role
 
 
 def test_a_page_that_the_display_no_longer_lists_ends(west):
-    ben = Page("c2", "Ben", "operator")
+    ben = PageState("c2", "Ben", "operator")
     west.connects(ANN, ben)
     assert west.connects(ben) == [Disconnect("west/c1")]
     assert west.displays.introduction() == [Connect("west/c2", "Ben", "operator")]
@@ -244,7 +245,7 @@ def test_a_page_that_the_display_no_longer_lists_ends(west):
 
 def test_pages_that_ended_while_the_display_was_slow_return_with_its_next_list(west):
     west.connects(ANN)
-    assert west.displays.look(3.1) == [Disconnect("west/c1")]
+    assert west.displays.check(3.1) == [Disconnect("west/c1")]
     assert west.answers(3.1, (ANN, OWN)) == [PAGE, PROGRAM]
 
 
@@ -278,10 +279,10 @@ def test_displays_and_pages_that_a_user_pretends_leave_the_room_of_others(west):
         except WireError:
             refused += 1
     assert refused == 40
-    many = [Page(f"c{number}", "Eve", "operator") for number in range(250)]
+    many = [PageState(f"c{number}", "Eve", "operator") for number in range(250)]
     for number in range(5):
         got = west.connects(*many, name=f"mal.{number}")
-        assert len(got) == displays_module.MOST_PAGES
+        assert len(got) == gate_messages.MOST_PAGES
     assert west.connects(*many, name="mal.6") == []
     assert west.connects(ANN) == [PAGE]
     command = FromPage("west/c1", b'{"op":"take","robot":"r1"}')
@@ -330,16 +331,16 @@ def test_a_stop_is_obeyed_whatever_limit_is_reached(west, limit):
             for number in range(5000):
                 other = f"eve.{number % 9}" if limit.endswith("user") else name
                 with suppress(WireError):
-                    west.send(Answer(0, 0), 0.0, other, numbering)
+                    west.send(SampleAck(0, 0), 0.0, other, numbering)
             with pytest.raises(WireError, match="sends too much"):
-                west.send(Answer(0, 0), 0.0, name, numbering)
+                west.send(SampleAck(0, 0), 0.0, name, numbering)
         case "number":
             numbering.sent = (1 << 64) - 2
-            west.send(Answer(0, 0), 0.0, name, numbering)
+            west.send(SampleAck(0, 0), 0.0, name, numbering)
             numbering.sent = 3
         case "session":
             for _ in range(3):
-                west.send(Answer(0, 0), 0.0, name, Numbering())
+                west.send(SampleAck(0, 0), 0.0, name, Numbering())
         case "connection":
             message = FromPage("west/c1", STOP_R1)
         case "program":
@@ -350,7 +351,7 @@ def test_a_stop_is_obeyed_whatever_limit_is_reached(west, limit):
 def test_the_second_copy_of_a_stop_is_no_second_stop(west):
     west.connects(ANN)
     sample = west.numbering.next(msgspec.msgpack.encode(FromPage("west/c1", STOP)))
-    took = Took("west", west.numbering.session, west.numbering.sent)
+    took = StopAck("west", west.numbering.session, west.numbering.sent)
     assert west.displays.receive("west", sample, 0.0) == [
         FromPage("west/c1", STOP),
         took,
@@ -397,7 +398,7 @@ def test_a_stop_that_waits_for_a_tick_is_for_its_robot(west):
 def test_a_display_that_replaces_its_pages_all_the_time_sends_too_much(west):
     changed = 0
     for turn in range(50):
-        pages = [Page(f"c{turn}.{n}", "Ann", "operator") for n in range(100)]
+        pages = [PageState(f"c{turn}.{n}", "Ann", "operator") for n in range(100)]
         with suppress(WireError):
             changed += len(west.connects(*pages))
     assert changed < 1500
@@ -408,19 +409,19 @@ def test_a_command_and_a_list_have_a_greatest_size(west):
     long = FromPage("west/c1", b"x" * displays_module.MOST_COMMAND)
     with pytest.raises(WireError, match="got a command of"):
         west.send(long)
-    name = "\U0001f916" * displays_module.MOST_NAME
+    name = "\U0001f916" * gate_messages.MOST_NAME
     pages = [
-        Page(f"c{number:05}.12345", name, "operator", (0.5, 0.5), False)
-        for number in range(displays_module.MOST_PAGES)
+        PageState(f"c{number:05}.12345", name, "operator", (0.5, 0.5), False)
+        for number in range(gate_messages.MOST_PAGES)
     ]
     assert len(west.connects(*pages)) == 1 + 2 * len(pages)
-    answer = Answer(1 << 63, 1 << 63, tuple(pages), reports=True)
-    assert len(msgspec.msgpack.encode(answer)) < displays_module.MOST_SAMPLE - 16
+    answer = SampleAck(1 << 63, 1 << 63, tuple(pages), reports=True)
+    assert len(msgspec.msgpack.encode(answer)) < gate_messages.MOST_SAMPLE - 16
 
 
 def test_a_sample_that_comes_twice_or_late_is_dropped(west):
-    first = west.numbering.next(msgspec.msgpack.encode(Answer(0, 0, (ANN,))))
-    second = west.numbering.next(msgspec.msgpack.encode(Answer(0, 0, ())))
+    first = west.numbering.next(msgspec.msgpack.encode(SampleAck(0, 0, (ANN,))))
+    second = west.numbering.next(msgspec.msgpack.encode(SampleAck(0, 0, ())))
     assert west.displays.receive("west", second, 0.0) == []
     assert west.displays.receive("west", first, 0.0) == []
     assert west.displays.receive("west", second, 0.0) == []
@@ -431,9 +432,9 @@ def test_the_pages_of_a_silent_display_with_control_end_after_1_s(west):
     west.reports_control_of("west/c1")
     west.receive(1, 0.05)
     west.answers(0.1)
-    assert west.displays.look(1.05) == []
-    assert west.displays.look(1.06) == [Disconnect("west/c1")]
-    assert west.displays.look(1.2) == []
+    assert west.displays.check(1.05) == []
+    assert west.displays.check(1.06) == [Disconnect("west/c1")]
+    assert west.displays.check(1.2) == []
 
 
 def test_control_that_begins_long_after_an_answer_is_not_ended_at_once(west):
@@ -442,8 +443,8 @@ def test_control_that_begins_long_after_an_answer_is_not_ended_at_once(west):
     west.answers(0.1)
     west.reports_control_of("west/program", 1.5)  # from another display
     west.reports_control_of("west/program", 1.7)
-    assert west.displays.look(2.0) == []
-    assert west.displays.look(2.01) == [Disconnect("west/program")]
+    assert west.displays.check(2.0) == []
+    assert west.displays.check(2.01) == [Disconnect("west/program")]
 
 
 @pytest.mark.parametrize("end", ["released", "gone", "of another"])
@@ -457,10 +458,10 @@ def test_the_pages_of_a_silent_display_without_control_end_after_3_s(west, end):
             west.displays.send(RobotGone("r1"), 0.0)
     west.receive(1, 0.05)
     west.answers(0.1)
-    assert west.displays.look(3.05) == []
+    assert west.displays.check(3.05) == []
     ended = [Disconnect("west/c1"), Disconnect("west/program")]
-    assert west.displays.look(3.06) == ended
-    assert west.displays.look(3.2) == []
+    assert west.displays.check(3.06) == ended
+    assert west.displays.check(3.2) == []
 
 
 def test_an_answer_to_an_old_sample_is_no_sign_of_life(west):
@@ -468,16 +469,16 @@ def test_an_answer_to_an_old_sample_is_no_sign_of_life(west):
     west.reports_control_of("west/c1")
     for tick in range(30):
         west.receive(tick, 0.05 * tick)
-    late = Answer(west.order.session, 2)  # sent at 0.05 s
+    late = SampleAck(west.order.session, 2)  # sent at 0.05 s
     west.send(late, 1.5)
-    assert west.displays.look(1.5) == [Disconnect("west/c1")]
+    assert west.displays.check(1.5) == [Disconnect("west/c1")]
 
 
 def test_a_display_that_restarts_loses_its_pages(west):
     west.connects(ANN)
     west.numbering = Numbering()
     again = Connect("west/c2", "Ann", "operator")
-    page = Page("c2", "Ann", "operator")
+    page = PageState("c2", "Ann", "operator")
     assert west.connects(page) == [Disconnect("west/c1"), again]
 
 

@@ -49,7 +49,7 @@ class Page:
         self.links = []
         gates = Gates()
         gates.own = GateClient(self._link)
-        gates.far[AGENT] = GateClient(self._link, "bay3", "ann.4f/")
+        gates.remote[AGENT] = GateClient(self._link, "bay3", "ann.4f/")
         self.own, self.far = self.links
         for robot, url in (("here", "ws://127.0.0.1:9090"), (THERE, AGENT)):
             gates.declare(spec(robot, url))

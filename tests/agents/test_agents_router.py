@@ -61,7 +61,7 @@ def test_the_address_of_an_agent():
 def test_the_sender_is_named_by_the_key():
     key = address.data_in("bay3", "west", "4f", "1")
     assert address.sender_of(key) == ("west", "4f", "1")
-    for key_of in (address.gate_in, address.looks_in):
+    for key_of in (address.gate_in, address.camera_in):
         key = key_of("bay3", "west", "4f")
         assert address.sender_of(key).display == "west.4f"
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from webmap.agents.samples import SESSIONS, Numbering, Order
+from webmap.agents.gate_messages import SESSIONS, Numbering, Order
 from webmap.base.errors import WireError
 
 

@@ -7,8 +7,7 @@ from pathlib import Path
 import cbor2
 import pytest
 
-from webmap.agents.data import pack_frame
-from webmap.agents.scans import lean_scan
+from webmap.agents.data_messages import lean_scan, pack_frame
 from webmap.base.errors import WireError
 from webmap.ros.rosbridge.cbor import decode
 

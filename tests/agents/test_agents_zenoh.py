@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 from webmap.agents import address
-from webmap.agents.displays import MOST_SAMPLE
-from webmap.agents.peer import Peer, User, zenoh_config
+from webmap.agents.gate_messages import MOST_SAMPLE
+from webmap.agents.peer import Peer
 from webmap.agents.router import free_port, read_users, router_settings
+from webmap.agents.router_access import RouterUser, zenoh_config
 from webmap.base.errors import WireError
 
 zenoh = pytest.importorskip("zenoh")
@@ -73,7 +74,7 @@ def users(tmp_path):
 def test_a_large_sample_of_a_display_is_dropped_unread(by):
     got = []
     key = address.gate_in("bay3", "west", "1") if by == "router" else "webmap/other"
-    with router() as place, peers(place, User(), User()) as (one, other):
+    with router() as place, peers(place, RouterUser(), RouterUser()) as (one, other):
         most = {} if by == "router" else {"most": MOST_SAMPLE}
         other.listen(key, lambda _, data: got.append(len(data)), gate=True, **most)
         wait_for(lambda: one.put_gate(key, b"x") or got)
@@ -85,7 +86,7 @@ def test_a_large_sample_of_a_display_is_dropped_unread(by):
 
 def test_messages_arrive_with_their_keys_and_questions_are_answered():
     got = []
-    with router() as place, peers(place, User(), User()) as (one, other):
+    with router() as place, peers(place, RouterUser(), RouterUser()) as (one, other):
         other.listen("webmap/*/here", lambda key, data: got.append((key, data)))
         other.listen("webmap/a/gate/out", lambda _, data: got.append(data), gate=True)
         one.answer("webmap/a/about", lambda: b"robots")
@@ -107,7 +108,7 @@ def arrives_twice(peer, got):
 
 def test_a_sample_of_the_gate_is_sent_over_one_connection_alone():
     got = []
-    with router() as place, peers(place, User(), User()) as (one, other):
+    with router() as place, peers(place, RouterUser(), RouterUser()) as (one, other):
         other.listen("k", lambda key, data: got.append(data), gate=True)
         wait_for(lambda: arrives_twice(one, got))
         for number in range(4):
@@ -120,7 +121,7 @@ def test_a_sample_of_the_gate_is_sent_over_one_connection_alone():
 
 def test_an_ended_listener_gets_nothing():
     got = []
-    with router() as place, peers(place, User(), User()) as (one, other):
+    with router() as place, peers(place, RouterUser(), RouterUser()) as (one, other):
         number = other.listen("k", lambda key, data: got.append(data))
         other.listen("k", lambda key, data: got.append(b"second " + data))
         wait_for(lambda: (one.put_data("k", b"1"), time.sleep(0.05), got)[2])
@@ -134,7 +135,7 @@ def test_an_ended_listener_gets_nothing():
 
 def test_a_peer_without_a_router_says_so_and_connects_when_there_is_one():
     place = free_port("tcp/127.0.0.1:0")
-    peer = Peer(place, User())
+    peer = Peer(place, RouterUser())
     try:
         peer.start()
         wait_for(lambda: "cannot reach the router" in (peer.trouble or ""))
@@ -151,7 +152,7 @@ def test_a_peer_without_a_router_says_so_and_connects_when_there_is_one():
 
 
 def test_a_sample_for_a_session_that_closes_is_dropped():
-    with router() as place, peers(place, User()) as (peer,):
+    with router() as place, peers(place, RouterUser()) as (peer,):
         for session in peer._gate:
             session.close()
         peer.put_gate("k", b"late")
@@ -159,7 +160,7 @@ def test_a_sample_for_a_session_that_closes_is_dropped():
 
 def test_a_user_with_a_wrong_password_is_not_let_in(users):
     with router(users=users) as place:
-        peer = Peer(place, User("west", "wrong"))
+        peer = Peer(place, RouterUser("west", "wrong"))
         try:
             peer.start()
             wait_for(lambda: "does not let the user west in" in (peer.trouble or ""))
@@ -171,7 +172,11 @@ def test_a_user_with_a_wrong_password_is_not_let_in(users):
 
 def test_a_display_reaches_the_agents_that_its_user_may_drive(users):
     got = []
-    west, bay3, bay4 = User("west", "two"), User("bay3", "one"), User("bay4", "four")
+    west, bay3, bay4 = (
+        RouterUser("west", "two"),
+        RouterUser("bay3", "one"),
+        RouterUser("bay4", "four"),
+    )
     with (
         router(users=users) as place,
         peers(place, west, bay3, bay4) as (display, one, other),
@@ -202,10 +207,14 @@ def test_a_display_reaches_the_agents_that_its_user_may_drive(users):
 
 def test_a_display_and_another_agent_cannot_speak_for_an_agent(users):
     got = []
-    west, bay3, bay4 = User("west", "two"), User("bay3", "one"), User("bay4", "four")
+    west, bay3, bay4 = (
+        RouterUser("west", "two"),
+        RouterUser("bay3", "one"),
+        RouterUser("bay4", "four"),
+    )
     with (
         router(users=users) as place,
-        peers(place, User("west", "two"), west, bay3, bay4) as (
+        peers(place, RouterUser("west", "two"), west, bay3, bay4) as (
             listener,
             display,
             one,
@@ -225,16 +234,20 @@ def test_a_display_and_another_agent_cannot_speak_for_an_agent(users):
 
 def test_a_display_finds_the_agents_that_it_reaches_without_their_names(users):
     found = []
-    west, bay3, bay4 = User("west", "two"), User("bay3", "one"), User("bay4", "four")
+    west, bay3, bay4 = (
+        RouterUser("west", "two"),
+        RouterUser("bay3", "one"),
+        RouterUser("bay4", "four"),
+    )
     with (
         router(users=users) as place,
         peers(place, west, bay3, bay4) as (display, one, other),
     ):
-        display.listen(address.here(address.EVERY), lambda key, _: found.append(key))
+        display.listen(address.beacon(address.EVERY), lambda key, _: found.append(key))
         wait_for(
             lambda: (
-                other.put_data(address.here("bay4"), b"here"),
-                one.put_data(address.here("bay3"), b"here"),
+                other.put_data(address.beacon("bay4"), b"here"),
+                one.put_data(address.beacon("bay3"), b"here"),
                 time.sleep(0.05),
                 len(found) > 5,
             )[3]
@@ -249,7 +262,7 @@ def test_peers_reach_a_router_over_tls():
             certificate=str(TLS / "router.pem"),
             key=str(TLS / "router.key"),
         ) as place,
-        peers(place, User(ca=str(TLS / "ca.pem"))) as (peer,),
+        peers(place, RouterUser(ca=str(TLS / "ca.pem"))) as (peer,),
     ):
         assert peer.connected
 
@@ -264,7 +277,9 @@ def test_a_router_with_a_wrong_certificate_is_refused(name, words):
         certificate=str(TLS / f"{name}.pem"),
         key=str(TLS / f"{name}.key"),
     ) as place:
-        peer = Peer(place, User(ca=str(TLS / "ca.pem") if name == "expired" else ""))
+        peer = Peer(
+            place, RouterUser(ca=str(TLS / "ca.pem") if name == "expired" else "")
+        )
         try:
             peer.start()
             wait_for(lambda: "its certificate is not valid" in (peer.trouble or ""))
@@ -275,7 +290,7 @@ def test_a_router_with_a_wrong_certificate_is_refused(name, words):
 
 
 def test_of_messages_that_wait_for_a_slow_link_the_newest_are_kept():
-    peer = Peer("tcp/127.0.0.1:1", User())  # it is not started
+    peer = Peer("tcp/127.0.0.1:1", RouterUser())  # it is not started
     peer.trouble = None
     for number in range(2000):
         peer.put_data("small", b"%d" % number)
@@ -291,8 +306,8 @@ def test_of_messages_that_wait_for_a_slow_link_the_newest_are_kept():
 
 def test_what_is_larger_than_expected_is_dropped_before_it_fills_the_memory():
     got = []
-    with router() as place, peers(place, User()) as (sender,):
-        small = Peer(place, User(), most=1 << 20)
+    with router() as place, peers(place, RouterUser()) as (sender,):
+        small = Peer(place, RouterUser(), most=1 << 20)
         try:
             small.start()
             wait_for(lambda: small.connected)
@@ -310,7 +325,7 @@ def test_what_is_larger_than_expected_is_dropped_before_it_fills_the_memory():
 
 
 def test_what_waits_for_a_slow_link_does_not_fill_the_memory():
-    peer = Peer("tcp/127.0.0.1:1", User())
+    peer = Peer("tcp/127.0.0.1:1", RouterUser())
     peer.trouble = None
     for _ in range(20):
         peer.put_data("k", bytes(2 << 20), all=True)
@@ -322,7 +337,7 @@ def test_a_self_signed_certificate_that_zenoh_refuses_is_no_wrong_password(users
     key = str(TLS / "self-signed.key")
     tls = {"certificate": certificate, "key": key}
     with router("tls/127.0.0.1:0", users, **tls) as place:
-        peer = Peer(place, User("west", "two", certificate))
+        peer = Peer(place, RouterUser("west", "two", certificate))
         try:
             peer.start()
             wait_for(lambda: "cannot reach the router" in (peer.trouble or ""))
@@ -334,7 +349,7 @@ def test_a_self_signed_certificate_that_zenoh_refuses_is_no_wrong_password(users
 
 def test_a_closed_peer_leaves_no_thread_inside_zenoh():
     with socket.create_server(("127.0.0.1", 0)) as silent:
-        peer = Peer(f"tcp/127.0.0.1:{silent.getsockname()[1]}", User())
+        peer = Peer(f"tcp/127.0.0.1:{silent.getsockname()[1]}", RouterUser())
         peer.start()
         time.sleep(0.3)
         peer.close()
@@ -345,7 +360,7 @@ def test_an_agent_hears_only_from_the_router_what_it_may_send(users):
     heard = []
     with (
         router(users=users) as place,
-        peers(place, User("bay3", "one"), User("west", "two")) as both,
+        peers(place, RouterUser("bay3", "one"), RouterUser("west", "two")) as both,
     ):
         for peer in both:
             name = peer.user.name

@@ -17,7 +17,7 @@ from webmap.console import Console
 from webmap.core.pictures import pictures
 from webmap.core.runtime import runtime
 from webmap.features.cameras.camera_panel import cameras_of
-from webmap.fleet.of_agents import find_agents
+from webmap.fleet.remote_robots import find_agents
 
 
 def seen(robot):

@@ -14,7 +14,7 @@ from webmap.base.errors import NoLease
 from webmap.base.geometry import Quaternion, Vector3
 from webmap.console import Console
 from webmap.core.runtime import runtime
-from webmap.fleet.of_agents import find_agents
+from webmap.fleet.remote_robots import find_agents
 
 console = Console()
 

@@ -12,8 +12,9 @@ import pytest
 
 from cli_inside import run_inside
 from webmap.agents import address
-from webmap.agents.description import PROTOCOL, Beacon, read_about
-from webmap.agents.peer import Peer, User
+from webmap.agents.announcements import PROTOCOL, Beacon, read_about
+from webmap.agents.peer import Peer
+from webmap.agents.router_access import RouterUser
 from webmap.fleet.agent import (
     parse_beams,
     parse_operators,
@@ -137,9 +138,9 @@ def test_an_agent_describes_the_robots_of_its_fleet_file_and_listens_on_nothing(
         simulator("--robots", "1") as url,
     ):
         file.write_text(FLEET.format(url=url))
-        peer = Peer(router, User())
+        peer = Peer(router, RouterUser())
         beacons = []
-        peer.listen(address.here("*"), lambda key, data: beacons.append((key, data)))
+        peer.listen(address.beacon("*"), lambda key, data: beacons.append((key, data)))
         peer.start()
         try:
             with webmap(
@@ -188,8 +189,8 @@ def test_a_second_agent_of_the_same_name_waits_and_says_why(tmp_path):
 
 def wait_for_beacon(router):
     beacons = []
-    peer = Peer(router, User())
-    peer.listen(address.here("bay3"), lambda key, data: beacons.append(data))
+    peer = Peer(router, RouterUser())
+    peer.listen(address.beacon("bay3"), lambda key, data: beacons.append(data))
     peer.start()
     try:
         wait_for(lambda: beacons)

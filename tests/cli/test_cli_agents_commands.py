@@ -10,7 +10,8 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 from webmap.agents import address as keys
-from webmap.agents.peer import Peer, User
+from webmap.agents.peer import Peer
+from webmap.agents.router_access import RouterUser
 from webmap_process import simulator
 from webmap_process import webmap as running
 
@@ -46,8 +47,8 @@ def wait_for_sign(router, name):
 
     An agent publishes the sign once it knows that no other agent has its name.
     """
-    signs, peer = [], Peer(router, User())
-    peer.listen(keys.here(name), lambda *sign: signs.append(sign))
+    signs, peer = [], Peer(router, RouterUser())
+    peer.listen(keys.beacon(name), lambda *sign: signs.append(sign))
     peer.start()
     try:
         deadline = time.monotonic() + 30

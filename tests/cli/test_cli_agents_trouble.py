@@ -14,9 +14,10 @@ import psutil
 import pytest
 
 from webmap.agents import address
-from webmap.agents.description import PROTOCOL, Beacon
-from webmap.agents.link import AgentLane
-from webmap.agents.peer import Peer, User, close_peers, peer_of
+from webmap.agents.announcements import PROTOCOL, Beacon
+from webmap.agents.link import AgentConnection
+from webmap.agents.peer import Peer, close_peers, peer_of
+from webmap.agents.router_access import RouterUser
 from webmap.ros.rosbridge import ops
 from webmap_process import simulator, webmap
 
@@ -49,12 +50,12 @@ def lines_of(*arguments, **environment):
 def beacons(router, name, beacon):
     """Publish the beacon of an agent repeatedly."""
     ended = threading.Event()
-    peer = Peer(router, User())
+    peer = Peer(router, RouterUser())
     peer.start()
 
     def repeat():
         while not ended.wait(0.2):
-            peer.put_data(address.here(name), msgspec.json.encode(beacon))
+            peer.put_data(address.beacon(name), msgspec.json.encode(beacon))
 
     thread = threading.Thread(target=repeat)
     thread.start()
@@ -161,7 +162,7 @@ class Poses:
 
     def __init__(self, url):
         self.at = 0.0
-        self.lane = AgentLane(
+        self.lane = AgentConnection(
             url, opened=self.subscribe, received=self.take, closed=str, failed=str
         )
         self.lane.start(asyncio.get_running_loop())
@@ -182,7 +183,7 @@ class Poses:
 def test_poses_are_back_three_seconds_after_a_killed_agent_is(tmp_path):
     async def trial(url, router):
         signs = []
-        peer_of(router).listen(address.here("bay3"), lambda *_: signs.append(1))
+        peer_of(router).listen(address.beacon("bay3"), lambda *_: signs.append(1))
         agent = start_agent(url, router, tmp_path)
         try:
             poses = Poses(f"{router}/bay3")

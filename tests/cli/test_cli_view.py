@@ -18,11 +18,11 @@ from webmap.core.layer import Layer
 from webmap.discovery import FoundRobot, Guess, discover
 from webmap.discovery.findings import ROLES
 from webmap.discovery.newcomers import Newcomers, News
-from webmap.fleet.found import find_fleet
-from webmap.fleet.given import Candidate
 from webmap.fleet.overrides import Overrides, parse_setting
-from webmap.fleet.shown import ShownRobots
-from webmap.fleet.watch import LookingForLayers
+from webmap.fleet.periodic_search import LayerSearch
+from webmap.fleet.robot_options import Candidate
+from webmap.fleet.search import find_fleet
+from webmap.fleet.view_robots import ViewRobots
 from webmap_process import simulator
 
 pytestmark = pytest.mark.slow
@@ -184,12 +184,12 @@ def found(name="bob", **more):
 
 def test_a_new_robot_appears_on_open_pages_and_on_later_pages(bridge):
     console = Console()
-    late = ShownRobots(console)
+    late = ViewRobots(console)
     early = FakePage()
     console.opened(early)
     late.add(Candidate(bridge, found()))
     for topic in ("/map", "/other/map", "/map"):  # the first map appears again
-        late.came(News(found(**{topic: GRID}), ("map",)), bridge)
+        late.show_news(News(found(**{topic: GRID}), ("map",)), bridge)
     after = FakePage()
     console.opened(after)
     for page in (early, after):
@@ -203,8 +203,8 @@ def test_a_new_robot_appears_on_open_pages_and_on_later_pages(bridge):
 
 def test_a_new_robot_gets_a_unique_name(bridge, capsys):
     given = [candidate(Bridge("ws://al:9090"), "BOB")]
-    late = ShownRobots(Console(), Overrides(stops_within=0.25), given=given)
-    came = late.came
+    late = ViewRobots(Console(), Overrides(stops_within=0.25), given=given)
+    came = late.show_news
     (robot,) = discover(TOPICS, "bob").robots
     came(News(robot), bridge)
     assert late.robots[0].name == "bob (bob:9090)"
@@ -217,7 +217,7 @@ def test_a_new_robot_gets_a_unique_name(bridge, capsys):
 
 
 def test_a_discovered_robot_gets_its_frames_plan_and_four_cameras(bridge):
-    late = ShownRobots(Console())
+    late = ViewRobots(Console())
     more = {"/tf": "tf2_msgs/TFMessage", "/plan": "nav_msgs/Path"}
     more |= {f"/cam{n}/image_raw/compressed": IMAGE for n in range(6)}
     robot = found(**more)
@@ -239,8 +239,8 @@ def test_a_robot_without_odometry_uses_the_amcl_pose(bridge):
 
 def test_a_robot_uses_topics_that_appear_later(bridge, capsys):
     console = Console()
-    late = ShownRobots(console, Overrides(stops_within=0.25))
-    came = late.came
+    late = ViewRobots(console, Overrides(stops_within=0.25))
+    came = late.show_news
     (bare,) = discover({"/odom": TOPICS["/odom"]}, "bob").robots
     came(News(bare), bridge)
     more = {"/scan": "sensor_msgs/LaserScan", "/tf": "tf2_msgs/TFMessage"}
@@ -267,8 +267,8 @@ def test_a_robot_uses_topics_that_appear_later(bridge, capsys):
 
 
 def test_cameras_that_appear_later_are_used_up_to_four(bridge, capsys):
-    late = ShownRobots(Console(), Overrides(stops_within=0.25))
-    came = late.came
+    late = ViewRobots(Console(), Overrides(stops_within=0.25))
+    came = late.show_news
     newcomers = Newcomers()
 
     def look(cameras):
@@ -301,8 +301,8 @@ def test_cameras_that_appear_later_are_used_up_to_four(bridge, capsys):
 
 
 def test_new_topics_of_a_robot_that_is_not_shown_are_ignored(bridge, capsys):
-    late = ShownRobots(Console())
-    late.came(News(found(), ("velocity",)), bridge)
+    late = ViewRobots(Console())
+    late.show_news(News(found(), ("velocity",)), bridge)
     assert late.robots == []
     assert capsys.readouterr().err == ""
 
@@ -364,8 +364,8 @@ def test_a_velocity_topic_from_a_setting_gets_its_type_from_the_topic_list(bridg
 
 
 def test_a_velocity_topic_that_appears_later_is_used_with_its_type(bridge):
-    late = ShownRobots(Console(), Overrides(stops_within=0.25))
-    came = late.came
+    late = ViewRobots(Console(), Overrides(stops_within=0.25))
+    came = late.show_news
     (bare,) = discover({"/odom": TOPICS["/odom"]}, "bob").robots
     came(News(bare), bridge)
     came(News(found(**{"/cmd_vel": STAMPED}), ("velocity",)), bridge)
@@ -377,13 +377,13 @@ def test_topics_that_appear_later_do_not_change_the_velocity_topic(bridge):
     settings = [parse_setting("bob.velocity=/cmd_vel_nav")]
     topics = TOPICS | {"/cmd_vel_nav": STAMPED}
     fleet = fleet_of(bridge, topics=topics, settings=["bob.velocity=/cmd_vel_nav"])
-    late = ShownRobots(Console(), Overrides(settings))
+    late = ViewRobots(Console(), Overrides(settings))
     late.add(fleet.robots[0])
     (robot,) = late.robots
     twist = robot.motion.config.twist
     assert twist.type == STAMPED
     whole = found(**{"/battery": "sensor_msgs/BatteryState"})
-    late.came(News(whole, ("battery",)), bridge)
+    late.show_news(News(whole, ("battery",)), bridge)
     assert robot.motion.config.twist is twist
     assert "Battery" in [type(module).__name__ for module in robot.modules]
     robot.destroy()
@@ -406,10 +406,10 @@ def drawing_of(bridge, topics, *settings):
     """Draw the layers found for one robot; return the robot, the console and layers."""
     console = Console()
     overrides = Overrides([parse_setting(text) for text in settings])
-    late = ShownRobots(console, overrides)
+    late = ViewRobots(console, overrides)
     (found_,) = overrides.findings(bridge.url, discover(topics, "bob")).robots
     late.add(Candidate(bridge, found_))
-    layers = LookingForLayers(bridge, late)
+    layers = LayerSearch(bridge, late)
     asyncio.run(layers.take(topics))
     return late.robots[0], console, layers
 

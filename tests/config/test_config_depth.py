@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from webmap.base.errors import ConfigError
 from webmap.config.checks import MOST_MISTAKES
 from webmap.config.toml_text import DEEPEST, LARGEST, FleetText, Lines, too_deep
-from webmap.fleet.made import prepare
+from webmap.fleet.fleet_file import prepare
 
 HEAD = '[bridges]\nb = "ws://robot:9090"\n'
 DEEP = ".".join(["a"] * 8000)

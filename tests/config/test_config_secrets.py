@@ -3,7 +3,7 @@
 import pytest
 
 from webmap.config.toml_text import readable_secret
-from webmap.fleet.made import prepare
+from webmap.fleet.fleet_file import prepare
 
 HEAD = '[bridges]\nb = "ws://robot:9090"\n[[robots]]\nname = "Bob"\nbridge = "b"\n'
 CAMERA = 'cameras = ["http://{}"]\n'

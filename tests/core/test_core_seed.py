@@ -10,7 +10,7 @@ import webmap
 from webmap.core.extendable import Extendable
 from webmap.core.map import Map
 from webmap.core.robot import Robot
-from webmap.core.world_view import World
+from webmap.core.world_view import WorldGroup
 
 TABLE = Path(__file__).parents[2] / "docs" / "reference" / "seed.md"
 OWNERS = {"map": Map, "robot": Robot, "extendable": Extendable}
@@ -71,7 +71,7 @@ def test_each_new_name_of_the_table_exists_with_its_arguments(section, old, new)
 def find(path):
     owner, *names = path.split(".")
     if path == "map.world.tf":
-        assert "tf" in vars(World())
+        assert "tf" in vars(WorldGroup())
         return None
     if owner in OWNERS:
         (name,) = names

@@ -13,8 +13,8 @@ from webmap.console import Console
 from webmap.discovery import discover
 from webmap.discovery.frames import FrameCollector, frame_collector
 from webmap.discovery.tf_robots import Trees
-from webmap.fleet.shown import ShownRobots
-from webmap.fleet.watch import LookingForLayers, LookingForRobots
+from webmap.fleet.periodic_search import LayerSearch, RobotSearch
+from webmap.fleet.view_robots import ViewRobots
 
 pytestmark = pytest.mark.slow
 
@@ -37,8 +37,8 @@ async def until(condition, seconds: float = 30.0) -> None:
 @pytest.fixture
 def quick(monkeypatch):
     """Make discovery look again after a short time."""
-    monkeypatch.setattr(LookingForRobots, "period", 0.05)
-    monkeypatch.setattr(LookingForLayers, "period", 0.05)
+    monkeypatch.setattr(RobotSearch, "period", 0.05)
+    monkeypatch.setattr(LayerSearch, "period", 0.05)
     monkeypatch.setitem(FrameCollector.listen.__kwdefaults__, "seconds", 0.3)
 
 
@@ -54,14 +54,14 @@ def test_a_robot_whose_frames_appear_later_is_shown_at_the_pose_from_its_frames(
             loop = asyncio.get_running_loop()
             bridge = Bridge(url)
             console = Console()
-            late = ShownRobots(console)
+            late = ViewRobots(console)
             topics = {"/tf": TF, **extra}
             trees = Trees()
             for parent, child, _ in received["/tf"]:
                 trees.take("", parent, child)
             (ann,) = discover(topics, "host", trees).robots
-            looking = LookingForRobots(bridge, [ann], late.came)
-            drawing = LookingForLayers(bridge, late)
+            looking = RobotSearch(bridge, [ann], late.show_news)
+            drawing = LayerSearch(bridge, late)
             bridge.start(loop)
             for service in (looking, drawing):
                 service.start(loop)
@@ -103,8 +103,8 @@ def test_a_robot_that_is_localised_later_is_drawn_in_the_map_frame(
         async def scenario() -> None:
             loop = asyncio.get_running_loop()
             bridge = Bridge(url)
-            late = ShownRobots(Console())
-            looking = LookingForRobots(bridge, [], late.came)
+            late = ViewRobots(Console())
+            looking = RobotSearch(bridge, [], late.show_news)
             bridge.start(loop)
             looking.start(loop)
             try:

@@ -13,10 +13,10 @@ from webmap.discovery import discover
 from webmap.discovery.doctor.measure import observe
 from webmap.discovery.fleet_toml import fleet_toml
 from webmap.discovery.tables import report
-from webmap.fleet import watch
-from webmap.fleet.find import find
-from webmap.fleet.shown import ShownRobots
-from webmap.fleet.watch import LookingForLayers, LookingForRobots
+from webmap.fleet import periodic_search
+from webmap.fleet.periodic_search import LayerSearch, RobotSearch
+from webmap.fleet.search import search_bridges
+from webmap.fleet.view_robots import ViewRobots
 from webmap.modules import declaration
 
 # The fake rosbridge is in the folder of the bridge's tests.
@@ -53,7 +53,7 @@ ANSWER = {"topics": [*MANY], "types": [*MANY.values()]}
 def test_a_search_asks_a_bridge_of_10_000_topics_two_questions():
     async def scenario() -> None:
         async with bridged(opened=False, topics=ANSWER) as (server, bridge):
-            (found,) = await find([bridge.url], wait=5.0)
+            (found,) = await search_bridges([bridge.url], wait=5.0)
             assert len(found.topics) == len(MANY) == 10_000
             (robot,) = found.findings.robots
             assert robot.topic("odometry") == "/robot_0/odom"
@@ -90,16 +90,16 @@ def test_topics_that_did_not_change_are_matched_once_and_beside_the_picture(
         threads.append(threading.current_thread())
         return discover(*args)
 
-    monkeypatch.setattr(watch, "discover", counted)
+    monkeypatch.setattr(periodic_search, "discover", counted)
 
     class Open:
         url = "ws://127.0.0.1:9"
         state = "open"
 
     async def scenario() -> None:
-        shown = ShownRobots(Console())
-        robots = LookingForRobots(Open(), [], lambda *news: None)
-        layers = LookingForLayers(Open(), shown)
+        shown = ViewRobots(Console())
+        robots = RobotSearch(Open(), [], lambda *news: None)
+        layers = LayerSearch(Open(), shown)
         for looking in (robots, layers):
             for _ in range(5):
                 await looking.take(dict(STATES))

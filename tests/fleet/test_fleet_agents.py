@@ -8,15 +8,20 @@ import msgspec
 import pytest
 
 from webmap import Robot
-from webmap.agents.description import DEEPEST, MOST_OF_ROBOT, MOST_ROBOTS, About
+from webmap.agents.announcements import (
+    DEEPEST,
+    MOST_OF_ROBOT,
+    MOST_ROBOTS,
+    About,
+)
 from webmap.base.errors import ConfigError
 from webmap.base.lifecycle import Lifecycle
 from webmap.console import Console
 from webmap.core.motion import id_at_agent
 from webmap.core.pictures import pictures
-from webmap.fleet import held, of_agents
-from webmap.fleet.held import open_at
-from webmap.fleet.made import prepare
+from webmap.fleet import agent_robots, remote_robots
+from webmap.fleet.agent_robots import open_addresses
+from webmap.fleet.fleet_file import prepare
 
 AGENTS = '[bridges]\nyard = "zenoh://hall:7447"\n'
 
@@ -63,17 +68,17 @@ def test_what_an_agent_describes_itself_is_refused(tmp_path, text, words):
 def test_a_rosbridge_on_loopback_is_reached_by_this_computer_alone():
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
-        assert open_at(f"ws://127.0.0.1:{port}") == []
+        assert open_addresses(f"ws://127.0.0.1:{port}") == []
 
 
 def test_an_agent_knows_where_other_computers_reach_its_rosbridge(monkeypatch):
     places = ["127.0.0.1", "0.0.0.0", "192.0.2.7"]
-    monkeypatch.setattr(held, "listening_addresses", lambda _: places)
-    assert open_at("ws://127.0.0.1:9090") == ["0.0.0.0", "192.0.2.7"]
+    monkeypatch.setattr(agent_robots, "listening_addresses", lambda _: places)
+    assert open_addresses("ws://127.0.0.1:9090") == ["0.0.0.0", "192.0.2.7"]
 
 
 def test_a_rosbridge_on_another_computer_is_reached_by_others():
-    assert open_at("ws://192.0.2.7:9090") == ["192.0.2.7"]
+    assert open_addresses("ws://192.0.2.7:9090") == ["192.0.2.7"]
 
 
 class FakePeer:
@@ -95,11 +100,11 @@ class FakePeer:
 def shown(monkeypatch):
     """A display that knows the agent bay3, and the display's messages to users."""
     peer, notices = FakePeer(), []
-    monkeypatch.setattr(of_agents, "peer_of", lambda router: peer)
-    monkeypatch.setattr(of_agents, "lifecycle", Lifecycle())
-    monkeypatch.setattr(of_agents, "PICTURE_AGAIN", 0.0)
-    monkeypatch.setattr(of_agents.runtime, "notice", notices.append)
-    agents, console = of_agents.Agents("zenoh://hall/bay3"), Console()
+    monkeypatch.setattr(remote_robots, "peer_of", lambda router: peer)
+    monkeypatch.setattr(remote_robots, "lifecycle", Lifecycle())
+    monkeypatch.setattr(remote_robots, "PICTURE_AGAIN", 0.0)
+    monkeypatch.setattr(remote_robots.runtime, "notice", notices.append)
+    agents, console = remote_robots.RemoteAgents("zenoh://hall/bay3"), Console()
 
     async def apply(agent, answer, beside):
         task = beside and asyncio.create_task(beside)
@@ -113,7 +118,7 @@ def shown(monkeypatch):
         described = [msgspec.Raw(msgspec.json.encode(each)) for each in configs]
         answer = msgspec.json.encode(About(["b"], described, []))
         asyncio.run(apply(agent, answer, beside))
-        if of_agents._undrawn(agent):
+        if remote_robots._undrawn(agent):
             asyncio.run(agents._draw(agent))
         return {robot.name: robot for robot in console.robots}
 

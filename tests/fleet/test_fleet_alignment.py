@@ -8,7 +8,7 @@ from webmap import Robot
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Pose
 from webmap.core.alignment_store import AlignmentStore
-from webmap.fleet.made import prepare, restore
+from webmap.fleet.fleet_file import prepare, restore
 from webmap.poses.alignment import alignments
 
 FILE = """\
@@ -85,7 +85,7 @@ def test_a_saved_alignment_is_used_until_the_fleet_file_changes(
     )
     for text, wanted in ((FILE, 7.0), (FILE.replace("12.5", "13.5"), 13.5)):
         fresh = AlignmentStore(tmp_path / "state")
-        monkeypatch.setattr("webmap.fleet.made.store", fresh)
+        monkeypatch.setattr("webmap.fleet.fleet_file.store", fresh)
         robots = ready(text).robots
         restore(robots)
         assert alignments.of(robots[0].pose_source.bridge).x == wanted

@@ -5,7 +5,7 @@ import pytest
 from webmap.base.errors import ConfigError
 from webmap.discovery import discover
 from webmap.discovery.fleet_toml import fleet_toml
-from webmap.fleet.made import prepare
+from webmap.fleet.fleet_file import prepare
 
 HEAD = '[bridges]\nhall = "ws://hall:9090"\n\n[[robots]]\nname = "Bob"\n'
 

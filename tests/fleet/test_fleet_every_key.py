@@ -19,9 +19,9 @@ from webmap.core.motion import RobotMotion
 from webmap.core.robot import apply_config
 from webmap.core.robot_model import element_to_dict
 from webmap.core.visible_robot import robots
-from webmap.fleet import agent, of_agents
-from webmap.fleet.held import held_in_file, moving_parts
-from webmap.fleet.made import make_bridges, make_robots
+from webmap.fleet import agent, remote_robots
+from webmap.fleet.agent_robots import moving_parts, robots_in_file
+from webmap.fleet.fleet_file import make_bridges, make_robots
 from webmap.scene.element import Element
 
 TEXT = (Path(__file__).parents[1] / "wires/fleets/every_key.toml").read_text()
@@ -148,11 +148,11 @@ def test_every_key_has_the_same_effect_directly_and_through_an_agent(
     assert mistakes.found == []
 
     peer = FakePeer()
-    for module in (agent, of_agents):
+    for module in (agent, remote_robots):
         monkeypatch.setattr(module, "peer_of", lambda _, **_limits: peer)
         monkeypatch.setattr(module, "lifecycle", Lifecycle())
     monkeypatch.setattr(RobotMotion, "agent", "bay3")
-    held = held_in_file(fleet)
+    held = robots_in_file(fleet)
     beside = [robots[each.id] for each in held.robots()]
     assert list(map(told, beside)) == list(map(told, direct))
     for each in beside:
@@ -164,7 +164,7 @@ def test_every_key_has_the_same_effect_directly_and_through_an_agent(
     peer.answers = {
         address.about_picture("bay3", n): d for n, d in held.pictures.items()
     }
-    here, console = of_agents.Agents("zenoh://hall/bay3"), Console()
+    here, console = remote_robots.RemoteAgents("zenoh://hall/bay3"), Console()
     known = here._known["bay3"]
     asyncio.run(here._apply(known, there._about, console))
     asyncio.run(here._draw(known))

@@ -11,10 +11,10 @@ from webmap.discovery import FoundRobot, Guess, discover
 from webmap.discovery.frames import frame_collector
 from webmap.discovery.newcomers import Newcomers
 from webmap.discovery.tf_robots import Trees
-from webmap.fleet.given import Candidate
 from webmap.fleet.overrides import Overrides, parse_setting
-from webmap.fleet.shown import ShownRobot, ShownRobots
-from webmap.fleet.watch import LookingForLayers
+from webmap.fleet.periodic_search import LayerSearch
+from webmap.fleet.robot_options import Candidate
+from webmap.fleet.view_robots import ViewRobot, ViewRobots
 
 TF = {"/tf": "tf2_msgs/TFMessage"}
 ODOM = {"/bob/odom": "nav_msgs/Odometry"}
@@ -45,7 +45,7 @@ class Watched:
     def __init__(self, bridge, *settings, given=()):
         self.bridge = bridge
         overrides = Overrides([parse_setting(text) for text in settings])
-        self.late = ShownRobots(Console(), overrides, given=given)
+        self.late = ViewRobots(Console(), overrides, given=given)
         self.newcomers = Newcomers()
 
     def look(self, topics, chain=""):
@@ -53,7 +53,7 @@ class Watched:
         for _ in range(3):
             findings = discover(topics, "host", trees(chain))
             for news in self.newcomers.look(findings):
-                self.late.came(news, self.bridge)
+                self.late.show_news(news, self.bridge)
 
     @property
     def robot(self):
@@ -220,8 +220,8 @@ def test_a_robot_option_is_drawn_in_a_map_frame_that_appears_later(
     about = candidate(bridge, odometry="/bob/odom", goal="/bob/goal_pose")
     config = about.found.config(bridge.url)
     robot = make_robot(config, [bridge])
-    given = [ShownRobot(*about, robot, config)]
-    drawing = LookingForLayers(bridge, ShownRobots(Console()), given=given)
+    given = [ViewRobot(*about, robot, config)]
+    drawing = LayerSearch(bridge, ViewRobots(Console()), given=given)
     frames = frame_collector(bridge)
     received = []
 

@@ -3,7 +3,7 @@
 import pytest
 
 from webmap.base.errors import ConfigError
-from webmap.fleet.made import prepare
+from webmap.fleet.fleet_file import prepare
 
 HEAD = """\
 [bridges]

@@ -6,8 +6,8 @@ from cli_inside import run_inside
 from webmap import Bridge
 from webmap.base.errors import ConfigError
 from webmap.discovery import discover
-from webmap.fleet.given import parse_robot
 from webmap.fleet.overrides import Overrides, parse_setting
+from webmap.fleet.robot_options import parse_robot
 
 URL = "ws://127.0.0.1:9090/"
 TOPICS = {
@@ -93,7 +93,7 @@ def test_the_velocity_type_setting_applies_also_with_another_velocity_topic(
 
 def test_the_velocity_type_setting_applies_to_a_robot_option():
     bob = parse_robot("Bob::/cmd_vel", [Bridge(URL)])
-    (given,) = overrides(f"Bob.velocity_type={STAMPED}").apply_to_given([bob])
+    (given,) = overrides(f"Bob.velocity_type={STAMPED}").apply_to_options([bob])
     assert given.found.type_of("velocity") == STAMPED
 
 
@@ -126,15 +126,15 @@ def test_the_camera_setting_accepts_a_list_of_topics(found):
 def test_settings_add_topics_to_a_robot_option():
     bridges = [Bridge(URL)]
     bob, al = (parse_robot(f"{name}:/odom", bridges) for name in ("Bob", "Al"))
-    (given,) = overrides("Bob.battery=/battery", "Bob.odometry=/odom2").apply_to_given(
-        [bob]
-    )
+    (given,) = overrides(
+        "Bob.battery=/battery", "Bob.odometry=/odom2"
+    ).apply_to_options([bob])
     assert given.found.topic("battery") == "/battery"
     assert given.found.topic("odometry") == "/odom2"
     with pytest.raises(ConfigError, match="write a fleet file"):
-        overrides("Bob.plan=/plan").apply_to_given([bob])
+        overrides("Bob.plan=/plan").apply_to_options([bob])
     with pytest.raises(ConfigError, match="two robots would be called 'BOB'"):
-        overrides("Al.name=BOB").apply_to_given([bob, al])
+        overrides("Al.name=BOB").apply_to_options([bob, al])
 
 
 def test_a_setting_for_an_unknown_robot_is_refused_unless_robots_may_still_appear():

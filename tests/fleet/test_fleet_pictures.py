@@ -10,7 +10,7 @@ from playwright.sync_api import expect
 from cli_shown import shown
 from webmap.base.errors import ConfigError
 from webmap.core.pictures import pictures
-from webmap.fleet.made import prepare
+from webmap.fleet.fleet_file import prepare
 
 GOOD = """\
 [bridges]

@@ -9,10 +9,10 @@ from webmap.console import Console
 from webmap.discovery import discover
 from webmap.discovery.fleet_toml import fleet_toml
 from webmap.features.layers.on_maps import OnMaps
-from webmap.fleet.given import Candidate
-from webmap.fleet.made import prepare
-from webmap.fleet.shown import ShownRobots
-from webmap.fleet.watch import LookingForLayers
+from webmap.fleet.fleet_file import prepare
+from webmap.fleet.periodic_search import LayerSearch
+from webmap.fleet.robot_options import Candidate
+from webmap.fleet.view_robots import ViewRobots
 
 URL = "ws://hall:9090"
 
@@ -60,11 +60,11 @@ def topics(*spaces):
 def viewed(found):
     """The robots and the maps that ``webmap view`` makes of these topics."""
     bridge, console = Bridge(URL), Console()
-    late = ShownRobots(console)
+    late = ViewRobots(console)
     findings = discover(found, "bob")
     for robot in findings.robots:
         late.add(Candidate(bridge, robot))
-    asyncio.run(LookingForLayers(bridge, late).take(found))
+    asyncio.run(LayerSearch(bridge, late).take(found))
     return console.robots, {topic for _, topic in console.grids}
 
 

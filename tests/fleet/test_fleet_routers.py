@@ -2,19 +2,19 @@
 
 import msgspec
 
-from webmap.agents.description import PROTOCOL, Beacon
-from webmap.agents.peer import User
+from webmap.agents.announcements import PROTOCOL, Beacon
+from webmap.agents.router_access import RouterUser
 from webmap.base.lifecycle import lifecycle
 from webmap.console import Console
-from webmap.fleet import of_agents
-from webmap.fleet.of_agents import AWAY, Agents
+from webmap.fleet import remote_robots
+from webmap.fleet.remote_robots import AWAY, RemoteAgents
 
 
 class FakePeer:
     """A router that may be unreachable, and the signs of its agents."""
 
     def __init__(self):
-        self.user = User()
+        self.user = RouterUser()
         self.trouble = "cannot reach the router: nothing listens there"
 
     def listen(self, key, fn):
@@ -36,9 +36,9 @@ def test_a_display_says_what_is_wrong_with_a_router_and_which_agents_are_away(
     monkeypatch,
 ):
     peer, clock = FakePeer(), Clock()
-    monkeypatch.setattr(of_agents, "peer_of", lambda _: peer)
-    monkeypatch.setattr(of_agents, "time", clock)
-    agents, console = Agents("zenoh://hall:7447"), Console()
+    monkeypatch.setattr(remote_robots, "peer_of", lambda _: peer)
+    monkeypatch.setattr(remote_robots, "time", clock)
+    agents, console = RemoteAgents("zenoh://hall:7447"), Console()
     try:
         agents.show_on(console)
         (describe,) = console.routers.values()

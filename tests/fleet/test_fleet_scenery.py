@@ -5,7 +5,7 @@ from PIL import Image
 
 from webmap.base.errors import ConfigError
 from webmap.console import Console
-from webmap.fleet.made import prepare, show_scenery
+from webmap.fleet.fleet_file import prepare, show_scenery
 
 BASE = """\
 [bridges]

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from webmap.base.errors import ConfigError
-from webmap.fleet.made import prepare
+from webmap.fleet.fleet_file import prepare
 
 HEAD = """[bridges]
 hall = "ws://hall:9090"

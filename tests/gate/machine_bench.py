@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from gate_harness import Bench
 
 from webmap.gate import events, protocol
-from webmap.gate.shell import IDLE_STEP, STEP
+from webmap.gate.process import IDLE_STEP, STEP
 
 BEAT = 0.05
 """Seconds between two heartbeats of the display, and between two answers of a link."""

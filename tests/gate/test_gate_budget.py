@@ -5,7 +5,7 @@ import pytest
 from webmap.gate.lanes import budget as limits
 from webmap.gate.lanes import lane as waits
 from webmap.gate.lanes.budget import Budget
-from webmap.gate.lanes.lane import Attempts
+from webmap.gate.lanes.lane import ReconnectWaits
 
 
 def send(budget, seconds, rate, *, size=100, work=0.00005, begin=1000.0, kept=0):
@@ -108,32 +108,32 @@ class TestBudget:
 
 class TestAttempts:
     def test_the_wait_doubles_after_each_failed_attempt_up_to_3_s(self):
-        attempts = Attempts()
+        attempts = ReconnectWaits()
         assert [attempts.failed() for _ in range(7)] == [
             0.1, 0.2, 0.4, 0.8, 1.6, 3.0, 3.0,
         ]  # fmt: skip
 
     def test_a_short_connection_does_not_reset_the_wait(self):
-        attempts = Attempts()
+        attempts = ReconnectWaits()
         lasted = waits.STEADY - 0.01
         waited = [attempts.ended(lasted, flooded=False) for _ in range(3)]
         assert waited == [0.1, 0.2, 0.4]
 
     def test_a_lasting_connection_resets_the_wait(self):
-        attempts = Attempts()
+        attempts = ReconnectWaits()
         attempts.failed()
         attempts.failed()
         assert attempts.ended(waits.STEADY, flooded=False) == waits.FIRST_WAIT
 
     def test_the_wait_doubles_after_each_flood_up_to_a_minute(self):
-        attempts = Attempts()
+        attempts = ReconnectWaits()
         waited = [attempts.ended(3.0, flooded=True) for _ in range(8)]
         assert waited == [1, 2, 4, 8, 16, 32, 60, 60]
         attempts.ended(waits.TAME, flooded=False)
         assert attempts.ended(3.0, flooded=True) == 1
 
     def test_an_error_is_new_only_once_until_a_connection_has_lasted(self):
-        attempts = Attempts()
+        attempts = ReconnectWaits()
         assert attempts.is_new("refused")
         assert not attempts.is_new("refused")
         attempts.ended(0.1, flooded=False)
@@ -142,6 +142,6 @@ class TestAttempts:
         assert attempts.is_new("refused")
 
     def test_a_bridge_with_many_different_errors_does_not_fill_the_log(self):
-        attempts = Attempts()
+        attempts = ReconnectWaits()
         new = sum(attempts.is_new(f"trouble {n}") for n in range(1000))
         assert new == waits.MOST_TROUBLES

@@ -5,7 +5,7 @@ import json
 from link_bench import in_loop, noting_bridge, raw_bridge, until
 
 from webmap.gate.lanes import tasks
-from webmap.gate.lanes.tasks import Calls
+from webmap.gate.lanes.tasks import ServiceCalls
 
 
 def request(id, service="/e_stop"):
@@ -15,7 +15,7 @@ def request(id, service="/e_stop"):
 @in_loop
 async def test_each_call_has_its_own_socket_that_closes_after_the_answer(caplog):
     async with noting_bridge() as bridge:
-        made = Calls(bridge.url)
+        made = ServiceCalls(bridge.url)
         made.call(request("a"), "a", "/e_stop")
         made.call(request("b"), "b", "/e_stop")
         await made.settle()
@@ -31,7 +31,7 @@ async def test_a_hanging_call_blocks_no_other_call_and_times_out(monkeypatch, ca
     monkeypatch.setattr(tasks, "CALL_TIMEOUT", 1.0)
     async with noting_bridge() as bridge:
         bridge.answers_services = False
-        made = Calls(bridge.url)
+        made = ServiceCalls(bridge.url)
         made.call(request("hangs"), "hangs", "cancelling")
         await until(lambda: bridge.of("call_service"), "the first call")
         bridge.answers_services = True
@@ -50,7 +50,7 @@ async def test_a_hanging_call_blocks_no_other_call_and_times_out(monkeypatch, ca
 async def test_only_the_answer_with_the_id_of_the_call_ends_the_call():
     async with noting_bridge() as bridge:
         bridge.answers_services = False
-        made = Calls(bridge.url)
+        made = ServiceCalls(bridge.url)
         made.call(request("a"), "a", "/e_stop")
         await until(lambda: bridge.of("call_service"), "the call")
         await bridge.send(1, "rubbish")
@@ -69,7 +69,7 @@ async def test_a_call_without_a_connection_is_logged_as_failed(caplog):
         link.send(b"HTTP/1.1 503 Service Unavailable\r\nContent-Length: 0\r\n\r\n")
 
     async with raw_bridge(talk) as url:
-        made = Calls(url)
+        made = ServiceCalls(url)
         made.call(request("a"), "a", "/e_stop")
         await made.settle()
         assert caplog.text.count("/e_stop: no connection: ") == 1
@@ -80,7 +80,7 @@ async def test_a_call_without_a_connection_is_logged_as_failed(caplog):
 async def test_a_call_ends_with_a_log_entry_when_its_connection_is_lost(caplog):
     async with noting_bridge() as bridge:
         bridge.answers_services = False
-        made = Calls(bridge.url)
+        made = ServiceCalls(bridge.url)
         made.call(request("a"), "a", "/e_stop")
         await until(lambda: bridge.of("call_service"), "the call")
         bridge.transport_of(1).abort()
@@ -93,7 +93,7 @@ async def test_a_call_ends_with_a_log_entry_when_its_connection_is_lost(caplog):
 async def test_closing_the_calls_closes_their_sockets_without_a_log_entry(caplog):
     async with noting_bridge() as bridge:
         bridge.answers_services = False
-        made = Calls(bridge.url)
+        made = ServiceCalls(bridge.url)
         made.call(request("a"), "a", "/e_stop")
         await until(lambda: bridge.of("call_service"), "the call")
         made.close()

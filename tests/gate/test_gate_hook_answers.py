@@ -11,7 +11,7 @@ from webmap.gate.display import pages
 from webmap.gate.lanes import navigation, tasks
 from webmap.gate.lanes.links import Links
 from webmap.gate.lanes.navigation import answer_to
-from webmap.gate.lanes.tasks import Calls
+from webmap.gate.lanes.tasks import ServiceCalls
 from webmap.gate.limits import Cap
 
 LOCK = {"topic": "/lock", "type": "std_msgs/Bool"}
@@ -78,7 +78,7 @@ class TestCall:
     async def test_a_refused_call_is_reported_and_logged(self, caplog):
         async with noting_bridge() as bridge:
             bridge.answers_services = False
-            ended, made = [], Calls(bridge.url)
+            ended, made = [], ServiceCalls(bridge.url)
             made.call(
                 b'{"op": "call_service", "id": "a"}', "a", "/e_stop", ended.append
             )
@@ -96,7 +96,7 @@ class TestCall:
             await link.accept(frame(0x8))
 
         async with raw_bridge(talk) as url:
-            ended, made = [], Calls(url)
+            ended, made = [], ServiceCalls(url)
             made.call(b"{}", "a", "/e_stop", ended.append)
             await made.settle()
         (why,) = ended

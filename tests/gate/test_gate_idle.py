@@ -9,11 +9,11 @@ from webmap.base.geometry import Twist
 from webmap.gate import actions, events, protocol
 from webmap.gate.disk import Disk, Records, path_of
 from webmap.gate.events import Key, LockState, Press, StopFileChanged
+from webmap.gate.process import IDLE_STEP
 from webmap.gate.rules import machines
 from webmap.gate.rules.health import LinkHealth
 from webmap.gate.rules.machine import Machine
 from webmap.gate.rules.machines import Machines
-from webmap.gate.shell import IDLE_STEP
 
 MANY = 100
 ANN, BEN = Press("Ann", "a1"), Press("Ben", "b1")

@@ -11,7 +11,7 @@ from webmap.gate.actions import SendGoal
 from webmap.gate.events import EchoReceived, Key, LinkUp
 from webmap.gate.lanes.control import ControlLane
 from webmap.gate.lanes.odometry import OdometryLane
-from webmap.gate.lanes.tasks import Calls, TasksLane
+from webmap.gate.lanes.tasks import ServiceCalls, TasksLane
 
 pytestmark = pytest.mark.slow
 
@@ -56,7 +56,7 @@ async def witness(url, events):
 
 
 async def tasks(url, events):
-    lane = TasksLane(url, events.append, Calls(url))
+    lane = TasksLane(url, events.append, ServiceCalls(url))
     lane.lane.hold("robots")
     lane.attach([("/move_base/goal", "move_base_msgs/MoveBaseActionGoal")])
     await of(events, LinkUp)

@@ -39,11 +39,11 @@ from machine_bench import PacedBench
 from webmap.base.geometry import Twist
 from webmap.gate import actions, commands, events, protocol
 from webmap.gate.events import Press
+from webmap.gate.process import STEP
 from webmap.gate.protocol import PROGRAM
 from webmap.gate.rules.connections import Epochs, Ticks
 from webmap.gate.rules.gate import Gate
 from webmap.gate.rules.motion import DEADMAN
-from webmap.gate.shell import STEP
 
 pytestmark = pytest.mark.slow
 

@@ -7,7 +7,7 @@ import threading
 import pytest
 
 from webmap.gate import pipe as pipe_module
-from webmap.gate.pipe import BackgroundHandler, Outbox, Unpacker
+from webmap.gate.pipe import BackgroundHandler, PipeWriter, Unpacker
 from webmap.gate.protocol import FromGate, GateUp, Ready, Tick
 
 
@@ -32,7 +32,7 @@ def received(read):
 
 class TestOutbox:
     def test_messages_are_sent_in_order(self, pipe):
-        box = Outbox(pipe[1])
+        box = PipeWriter(pipe[1])
         for number in range(3):
             box.put(Ready(number))
         box.close(5.0)
@@ -42,7 +42,7 @@ class TestOutbox:
         self, pipe, monkeypatch
     ):
         monkeypatch.setattr(pipe_module, "FULL", -1)
-        box = Outbox(pipe[1])
+        box = PipeWriter(pipe[1])
         box.put(Tick(1, {}))
         box.put(Ready(1))
         box.close(5.0)
@@ -50,7 +50,7 @@ class TestOutbox:
 
     def test_an_overfull_outbox_drops_every_message(self, pipe, monkeypatch):
         monkeypatch.setattr(pipe_module, "OVERFULL", -1)
-        box = Outbox(pipe[1])
+        box = PipeWriter(pipe[1])
         box.put(Ready(1))
         box.close(5.0)
         shut(pipe[1])
@@ -58,7 +58,7 @@ class TestOutbox:
 
     def test_writing_to_a_closed_display_raises_no_error(self, pipe):
         shut(pipe[0])
-        box = Outbox(pipe[1])
+        box = PipeWriter(pipe[1])
         box.put(Ready(1))
         box.close(5.0)
         assert not box._thread.is_alive()

@@ -14,7 +14,7 @@ from gate_robot import eventually
 from webmap.base.processes import python_command
 from webmap.gate import pipe, process
 from webmap.gate.events import Shutdown
-from webmap.gate.pipe import Outbox
+from webmap.gate.pipe import PipeWriter
 from webmap.gate.protocol import FromGate, Heartbeat, Ready
 from webmap.gate.rules.gate import Gate
 
@@ -103,7 +103,7 @@ def test_an_internal_error_is_logged_and_ends_the_gate_with_code_1(monkeypatch, 
     monkeypatch.setattr(Gate, "step", fail)
     kept = {n: signal.getsignal(n) for n in (signal.SIGTERM, signal.SIGINT)}
     (pipe_in, theirs), (out, pipe_out) = os.pipe(), os.pipe()
-    box = Outbox(pipe_out)
+    box = PipeWriter(pipe_out)
     try:
         assert asyncio.run(process._serve(pipe_in, box)) == 1
         assert "the gate has failed" in caplog.text

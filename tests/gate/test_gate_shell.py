@@ -8,12 +8,18 @@ import pytest
 from gate_harness import spec
 from link_bench import in_loop, noting_bridge, until
 
-from webmap.gate import actions, commands, events, protocol, shell
+from webmap.gate import (
+    actions,
+    commands,
+    events,
+    process,
+    protocol,
+)
 from webmap.gate.disk import UNKNOWN, Disk, Records, path_of
 from webmap.gate.events import Key, Press
 from webmap.gate.lanes.control import ControlLane
 from webmap.gate.locks import Locks
-from webmap.gate.shell import Shell
+from webmap.gate.process import Shell
 
 pytestmark = pytest.mark.slow
 
@@ -115,7 +121,7 @@ async def test_a_gate_without_its_display_stops_its_robots_and_ends(tmp_path):
     async with driving(tmp_path) as (bridge, gate):
         before = asyncio.get_running_loop().time()
         await gate.end()
-        assert asyncio.get_running_loop().time() - before < shell.DRAIN + 5.0
+        assert asyncio.get_running_loop().time() - before < process.DRAIN + 5.0
         assert not gate.shell.failed
         await until(lambda: speeds(bridge)[-1] == 0.0, "the zero")
         await until(lambda: not bridge.links, "the end of the links")
@@ -123,7 +129,7 @@ async def test_a_gate_without_its_display_stops_its_robots_and_ends(tmp_path):
 
 @in_loop
 async def test_goals_are_cancelled_before_the_gate_ends(tmp_path, monkeypatch):
-    monkeypatch.setattr(shell, "DRAIN", 30.0)
+    monkeypatch.setattr(process, "DRAIN", 30.0)
     async with noting_bridge() as bridge, Running(tmp_path) as gate:
         gate.shell.deliver(
             robot(bridge, action="/go", cancel_topic=None, on_operator_loss="cancel")
@@ -154,7 +160,7 @@ async def test_a_hanging_stop_hook_does_not_prevent_the_end_of_the_gate(tmp_path
         await until(lambda: bridge.of("call_service"), "the call")
         before = asyncio.get_running_loop().time()
         await gate.end()
-        assert asyncio.get_running_loop().time() - before < shell.DRAIN + 5.0
+        assert asyncio.get_running_loop().time() - before < process.DRAIN + 5.0
         bridge.unblock()
 
 
@@ -260,7 +266,7 @@ async def test_a_stalled_link_is_cut_and_zero_is_sent_first_on_the_new_link(tmp_
 @contextlib.asynccontextmanager
 async def robot_of_another_gate(tmp_path, monkeypatch):
     """Run a gate and declare a robot whose lock another gate has."""
-    monkeypatch.setattr(shell, "LOCK_RETRY", 0.05)
+    monkeypatch.setattr(process, "LOCK_RETRY", 0.05)
     other = Locks(tmp_path)
     async with noting_bridge() as bridge, Running(tmp_path) as gate:
         key = Key(bridge.url, "/cmd_vel")

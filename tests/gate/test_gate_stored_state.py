@@ -14,7 +14,7 @@ from gate_page import Page
 from gate_robot import eventually
 from stored_robots import FOLDER, IDENTITIES, PORT, ROBOTS, STOPPED, TESTED
 
-from webmap.gate import actions, events, shell
+from webmap.gate import actions, events, process
 from webmap.gate.disk import UNKNOWN, Disk, Records
 from webmap.gate.display.client import GateClient
 from webmap.gate.events import Key
@@ -116,12 +116,12 @@ class Outbox:
 def test_a_machine_marked_as_driven_gets_a_zero_for_every_name_of_localhost(
     stored, monkeypatch, host
 ):
-    monkeypatch.setattr(shell, "Links", Links)
+    monkeypatch.setattr(process, "Links", Links)
     url, other = f"ws://{host}:{PORT}", "ws://robot-nine.example:9090"
     specs = {spec.name: spec for spec in ROBOTS}
 
     async def scenario():
-        gate = shell.Shell(Outbox(), Locks(stored), Disk(Records(stored)))
+        gate = process.Shell(Outbox(), Locks(stored), Disk(Records(stored)))
         gate.deliver(msgspec.structs.replace(specs["Driven"], bridge_url=url))
         gate.deliver(specs["Untouched"])
         for there in (url, other):

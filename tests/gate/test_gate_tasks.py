@@ -8,7 +8,12 @@ from link_bench import in_loop, noting_bridge, until
 from webmap.gate.actions import SendGoal, SendPose
 from webmap.gate.events import GoalEnded, GoalLost, GoalProgress, Key, LinkDown, LinkUp
 from webmap.gate.lanes import tasks
-from webmap.gate.lanes.tasks import Calls, TasksLane, goal_topics, hook_topics
+from webmap.gate.lanes.tasks import (
+    ServiceCalls,
+    TasksLane,
+    goal_topics,
+    hook_topics,
+)
 
 MOVE_BASE = spec(
     action="/move_base", action_type="move_base_msgs/MoveBaseAction", cancel_topic=None
@@ -25,7 +30,7 @@ class Noting:
 
     def __init__(self, url):
         self.events = []
-        self.calls = Calls(url)
+        self.calls = ServiceCalls(url)
         self.tasks = TasksLane(url, self.events.append, self.calls)
         self.tasks.lane.hold("robots")
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from webmap.gate.process import STEP
 from webmap.gate.rules.motion import DEADMAN
-from webmap.gate.shell import STEP
 
 ROOT = Path(__file__).parents[2]
 

@@ -80,7 +80,7 @@ PROTOCOL_ROOMS = (
 ROSBRIDGE_TEXTS = {
     "bags/player.py": {"rosapi"},
     "cli/doctor.py": {"rosapi"},
-    "fleet/find.py": {"rosapi"},
+    "fleet/search.py": {"rosapi"},
     "cli/record.py": {"rosapi"},
     "bags/record.py": {"rosapi"},
     "cli/options.py": {"rosapi"},

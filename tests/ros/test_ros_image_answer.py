@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from camera_server import BOUNDARY, a_jpeg, part
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.ros.image_address import parse_address
-from webmap.ros.image_pull import Answer, Multipart
+from webmap.ros.image_pull import HttpResponseParser, Multipart
 from webmap.ros.messages_image import MAX_BYTES
 
 ONE, TWO = a_jpeg(), a_jpeg((0, 0, 200))
@@ -26,7 +26,7 @@ def fed(answer, data: bytes, size: int) -> list[bytes]:
 
 @given(size=st.integers(1, len(STREAM)))
 def test_a_stream_gives_the_same_pictures_for_any_chunk_size(size):
-    assert fed(Answer(), STREAM, size) == [ONE, TWO]
+    assert fed(HttpResponseParser(), STREAM, size) == [ONE, TWO]
 
 
 @given(size=st.integers(1, 700))
@@ -44,7 +44,7 @@ def test_the_boundary_name_may_include_the_leading_dashes():
 
 
 def test_a_single_picture_needs_no_content_length():
-    answer = Answer()
+    answer = HttpResponseParser()
     head = b"HTTP/1.1 200 OK\nContent-Type: image/jpeg\n\n"
     assert answer.feed(head + ONE[:50]) == []
     assert answer.feed(ONE[50:]) == []
@@ -53,7 +53,7 @@ def test_a_single_picture_needs_no_content_length():
 
 def test_a_single_picture_with_a_content_length_needs_no_end_of_stream():
     head = b"HTTP/1.1 200 OK\r\nContent-Type: image/png\r\nContent-Length: 5\r\n\r\n"
-    assert Answer().feed(head + b"12345rest") == [b"12345"]
+    assert HttpResponseParser().feed(head + b"12345rest") == [b"12345"]
 
 
 def answer_of(status="200 OK", kind="image/jpeg", more="", body=b"") -> bytes:
@@ -83,13 +83,13 @@ def answer_of(status="200 OK", kind="image/jpeg", more="", body=b"") -> bytes:
 )
 def test_an_invalid_camera_response_is_refused_with_a_reason(data, expected):
     with pytest.raises(ProtocolError, match=expected):
-        Answer().feed(data)
+        HttpResponseParser().feed(data)
 
 
 def test_a_camera_response_that_ends_too_early_is_refused():
     with pytest.raises(ProtocolError, match="without an answer"):
-        Answer().end()
-    answer = Answer()
+        HttpResponseParser().end()
+    answer = HttpResponseParser()
     answer.feed(answer_of(more="Content-Length: 500\r\n", body=ONE[:100]))
     with pytest.raises(ProtocolError, match="in the middle"):
         answer.end()
@@ -113,7 +113,7 @@ def test_an_invalid_stream_is_refused_before_filling_the_memory(body, expected):
 
 @given(data=st.binary(max_size=2000))
 def test_any_bytes_give_pictures_or_a_protocol_error(data):
-    for parser in (Answer(), Multipart("x")):
+    for parser in (HttpResponseParser(), Multipart("x")):
         with contextlib.suppress(ProtocolError):
             assert all(parser.feed(data))
 

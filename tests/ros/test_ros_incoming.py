@@ -29,11 +29,11 @@ def frame(data, first=0x81):
 class Reader:
     """Keeps the messages that are read, in order."""
 
-    def __init__(self, shaken=True):
+    def __init__(self, handshake_done=True):
         self.messages, self.others = [], b""
         self.incoming = Incoming(self.other)
         self.incoming.message = self.messages.append
-        self.incoming.shaken = shaken
+        self.incoming.handshake_done = handshake_done
         self.steps = 0
 
     def other(self, data):
@@ -148,14 +148,16 @@ def test_websockets_gets_a_frame_that_is_not_allowed_to_refuse_it(invalid):
 
 
 def test_during_the_handshake_each_line_is_a_step():
-    reader = Reader(shaken=False).read(b"HTTP/1.1 101 OK\r\nX: y\r\n", b"no end")
+    reader = Reader(handshake_done=False).read(
+        b"HTTP/1.1 101 OK\r\nX: y\r\n", b"no end"
+    )
     assert reader.others == b"HTTP/1.1 101 OK\r\nX: y\r\nno end"
     assert reader.steps == 3
 
 
 def test_bytes_that_wait_are_not_copied_again_for_each_that_comes():
     incoming = Incoming(bytes)
-    incoming.shaken = True
+    incoming.handshake_done = True
     incoming.feed(bytes(1 << 20))
     incoming.feed(b"x")
     kept = incoming._data

@@ -23,7 +23,7 @@ from webmap.ros.rosbridge.wire_subscription import (
     PATIENCE,
     THROTTLE,
     InJson,
-    Silence,
+    TopicSilence,
 )
 
 MAP = "nav_msgs/OccupancyGrid"
@@ -90,7 +90,7 @@ class TestDecision:
 class TestSilence:
     def looks(self, answers, until=60):
         """When a silent topic counts as not sent, at ten looks a second."""
-        silence = Silence(0.0)
+        silence = TopicSilence(0.0)
         for tenth in range(10 * until):
             now = tenth / 10
             if silence.due(now):

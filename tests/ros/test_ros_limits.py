@@ -168,7 +168,7 @@ def test_all_items_of_a_cbor_message_are_counted():
 )
 def test_the_worker_refuses_too_many_values_before_building_them(make):
     frame = make()
-    asked = worker.Request(len(frame), "/t", worker.view_name(Publish))
+    asked = worker.WorkRequest(len(frame), "/t", worker.view_name(Publish))
     tracemalloc.start()
     try:
         reply, _ = worker.answer(asked, frame)
@@ -192,7 +192,7 @@ def transforms(count):
 def test_a_message_with_too_many_transforms_is_refused():
     frame = transforms(10_001)
     view = worker.view_name(TFMessage)
-    asked = worker.Request(len(frame), "/t", worker.view_name(Publish), view)
+    asked = worker.WorkRequest(len(frame), "/t", worker.view_name(Publish), view)
     reply, _ = worker.answer(asked, frame)
     assert reply.error.startswith("got a message with 10001 transforms; the limit is")
 

@@ -241,7 +241,7 @@ def test_only_webmap_types_have_a_view_name_for_the_worker():
 
 def test_the_worker_answers_a_broken_frame_with_an_error():
     for frame in (b"", b"{", b"\xa1\xff", b"[" * 10000):
-        reply, parts = worker.answer(worker.Request(len(frame), "/a"), frame)
+        reply, parts = worker.answer(worker.WorkRequest(len(frame), "/a"), frame)
         assert reply.error
         assert not parts
 
@@ -256,7 +256,7 @@ def test_large_arrays_of_an_answer_are_not_copied_and_small_ones_do_not_keep_it(
         }
         data = cbor2.dumps({"op": "publish", "topic": "/map", "msg": grid})
         view = worker.view_name(OccupancyGridMsg)
-        request = worker.Request(len(data), "/map", worker.view_name(Publish), view)
+        request = worker.WorkRequest(len(data), "/map", worker.view_name(Publish), view)
         answer, parts = worker.answer(request, data)
         parts = [bytearray(part) for part in parts]
         (message,) = offload.values(answer, parts, OccupancyGridMsg)

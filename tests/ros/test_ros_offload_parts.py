@@ -289,7 +289,7 @@ def test_the_worker_reports_a_message_that_needs_too_much_memory(monkeypatch):
 
     monkeypatch.setattr(Publish, "decode", decode)
     reply, parts = worker.answer(
-        worker.Request(2, "/t", worker.view_name(Publish)), b"{}"
+        worker.WorkRequest(2, "/t", worker.view_name(Publish)), b"{}"
     )
     assert reply.error == "it takes too much memory to be decoded"
     assert not parts

@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from webmap.ros.rosbridge.connection import Lane
+from webmap.ros.rosbridge.connection import BridgeConnection
 from webmap.ros.rosbridge.incoming import MOST_FRAGMENTS
 from webmap.testing import Sentinel
 
@@ -41,7 +41,7 @@ async def bridge(talk):
 
 
 def lane(url, seen, ended=None):
-    return Lane(
+    return BridgeConnection(
         url,
         opened=lambda: seen.append("open"),
         received=seen.append,

@@ -25,7 +25,7 @@ def cut(chunks):
     pieces, waiting, cutting = [], bytearray(), Pieces()
     for chunk in chunks:
         waiting += chunk
-        while length := cutting.next(waiting, shaken=True):
+        while length := cutting.next(waiting, handshake_done=True):
             pieces.append(bytes(waiting[:length]))
             del waiting[:length]
     assert not waiting
@@ -69,9 +69,12 @@ def test_no_piece_contains_the_ends_of_two_frames_for_any_chunk_sizes(lengths, d
 
 def test_during_the_handshake_each_line_is_a_piece():
     cutting = Pieces()
-    assert cutting.next(bytearray(b"HTTP/1.1 101 OK\r\nX: y\r\n"), shaken=False) == 17
-    assert cutting.next(bytearray(b"no end"), shaken=False) == 6
-    assert cutting.next(bytearray(), shaken=False) == 0
+    assert (
+        cutting.next(bytearray(b"HTTP/1.1 101 OK\r\nX: y\r\n"), handshake_done=False)
+        == 17
+    )
+    assert cutting.next(bytearray(b"no end"), handshake_done=False) == 6
+    assert cutting.next(bytearray(), handshake_done=False) == 0
 
 
 class Greedy:

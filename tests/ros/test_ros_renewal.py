@@ -12,7 +12,7 @@ from webmap.ros.rosbridge.wire_subscription import (
     FIRST,
     LONGEST,
     UNANSWERED,
-    Silence,
+    TopicSilence,
 )
 
 TYPE = "nav_msgs/OccupancyGrid"
@@ -20,7 +20,7 @@ TYPE = "nav_msgs/OccupancyGrid"
 
 def looks(answers, until):
     """The times at which a silent topic is checked, and when it is renewed."""
-    silence = Silence(0.0)
+    silence = TopicSilence(0.0)
     asked, renewed = [], []
     for tenth in range(int(until * 10)):
         now = tenth / 10

@@ -24,11 +24,11 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import WebSocketException
 
 from webmap.agents import address
-from webmap.agents.data import DICTIONARY, FRAME, PACKED
-from webmap.agents.description import PROTOCOL, Beacon
-from webmap.agents.displays import Answer, Page, ToDisplays
-from webmap.agents.peer import Peer, User
-from webmap.agents.samples import Numbering
+from webmap.agents.announcements import PROTOCOL, Beacon
+from webmap.agents.data_messages import DICTIONARY, FRAME, PACKED
+from webmap.agents.gate_messages import Numbering, PageState, SampleAck, ToDisplays
+from webmap.agents.peer import Peer
+from webmap.agents.router_access import RouterUser
 from webmap.core.motion import id_at_agent
 
 BOB = "Bob (bay3)"
@@ -47,7 +47,7 @@ def describe(peer, about):
     peer.answer(address.about("bay4"), about)
     for number in itertools.count():
         beacon = Beacon(PROTOCOL, "hostile", f"{number}")
-        peer.put_data(address.here("bay4"), msgspec.json.encode(beacon))
+        peer.put_data(address.beacon("bay4"), msgspec.json.encode(beacon))
         yield number
         time.sleep(0.5)
 
@@ -164,8 +164,8 @@ def many_displays(peer, _url):
     while True:
         for number, numbering in enumerate(numberings):
             key = address.gate_in("bay3", "east", f"{number:08x}")
-            pages = tuple(Page(page, "x", "operator") for page in ("1", "2"))
-            peer.put_gate(key, numbering.next(encode(Answer(1, 1, pages))))
+            pages = tuple(PageState(page, "x", "operator") for page in ("1", "2"))
+            peer.put_gate(key, numbering.next(encode(SampleAck(1, 1, pages))))
         time.sleep(0.5)
 
 
@@ -273,7 +273,7 @@ def main():
     """Act as a user until standard input ends."""
     os.nice(19)
     name, router, url = sys.argv[1:]
-    peer = Peer(router, User.from_environment())
+    peer = Peer(router, RouterUser.from_environment())
     peer.start()
     while not peer.connected:
         time.sleep(0.05)

@@ -13,7 +13,8 @@ from safety_figures import Figure, note
 from safety_run import TRIALS, Progress, is_measured
 
 from webmap.agents import address
-from webmap.agents.peer import Peer, User
+from webmap.agents.peer import Peer
+from webmap.agents.router_access import RouterUser
 from webmap.testing import Shape
 
 pytest.importorskip("zenoh")
@@ -180,7 +181,7 @@ def test_a_link_that_becomes_slow_stops_the_robot(bench, hop):
 
 def test_repeated_and_disordered_samples_of_a_display_move_nothing(bench):
     recorded = []
-    other = Peer(f"zenoh://127.0.0.1:{bench.port}", User())
+    other = Peer(f"zenoh://127.0.0.1:{bench.port}", RouterUser())
     try:
         other.start()
         key = address.gate_in("bay3", address.EVERY, address.EVERY)

@@ -7,12 +7,14 @@ from webmap.scene.element import Element
 
 
 def test_every_svg_tag_has_a_maker():
-    makers = {item.tag for item in vars(svg).values() if isinstance(item, svg.Maker)}
+    makers = {item.tag for item in vars(svg).values() if isinstance(item, svg.SvgMaker)}
     assert makers == set(SVG_TAGS)
 
 
 def test_every_html_tag_has_a_maker():
-    makers = {item.tag for item in vars(html).values() if isinstance(item, html.Maker)}
+    makers = {
+        item.tag for item in vars(html).values() if isinstance(item, html.HtmlMaker)
+    }
     assert makers == set(HTML_TAGS)
 
 

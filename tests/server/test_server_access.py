@@ -5,8 +5,8 @@ from webmap.base.errors import ConfigError
 from webmap.core.base_page import Viewer
 from webmap.server.access import (
     AccessControl,
+    AccessRefusal,
     Redirect,
-    Refusal,
     RequestHead,
     Settings,
     SignedIn,
@@ -290,7 +290,7 @@ def test_two_browsers_are_two_viewers(access):
 @pytest.mark.parametrize("cookie", [[], ["webmap_8080="], ["webmap_8080=a.b"], ["="]])
 def test_a_request_without_a_valid_cookie_is_refused(access, cookie):
     got = access.identify(RequestHead.of(scope(cookie=cookie)), 0.0)
-    assert isinstance(got, Refusal)
+    assert isinstance(got, AccessRefusal)
     assert got.status == 401
 
 

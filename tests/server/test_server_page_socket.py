@@ -21,9 +21,9 @@ from webmap.server.page_socket import (
     REPLACED,
     SCENE,
     Allowance,
-    Bounds,
     Opens,
     OpenSockets,
+    SocketLimits,
     short,
 )
 
@@ -38,7 +38,7 @@ def test_messages_up_to_the_size_limit_are_accepted_and_larger_ones_refused():
 
 
 def test_size_is_counted_in_bytes_not_in_characters():
-    bounds = Bounds(max_bytes=3, rate=1.0, burst=9.0)
+    bounds = SocketLimits(max_bytes=3, rate=1.0, burst=9.0)
     assert Allowance(bounds, 0.0).spend("é€", 0.0) is not None
     assert Allowance(bounds, 0.0).spend("€", 0.0) is None
     assert Allowance(bounds, 0.0).spend("\ud800", 0.0) is None

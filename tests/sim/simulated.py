@@ -19,7 +19,7 @@ from webmap.ros.rosbridge.server.schema import Schema
 from webmap.ros.rosbridge.server.session import Session
 from webmap.sim.maps import FREE, OCCUPIED, FloorPlan
 from webmap.sim.node import STEP, RobotsNode
-from webmap.sim.robot import BaseOptions, Robot
+from webmap.sim.robot import BaseOptions, SimRobot
 from webmap.sim.scanner import ScannerOptions
 from webmap.sim.world import World, WorldOptions
 
@@ -42,7 +42,7 @@ ORIGIN = Pose()
 
 def alone(pose=ORIGIN, **options):
     """A robot without obstacles around it."""
-    return Robot("robot_0", pose, BaseOptions(**options))
+    return SimRobot("robot_0", pose, BaseOptions(**options))
 
 
 def drive(robot, twist, seconds, *, now=0.0, dt=0.025, blocked=lambda x, y: False):

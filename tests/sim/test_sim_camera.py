@@ -19,7 +19,7 @@ from webmap.ros.rosbridge.server.schema import Schema
 from webmap.sim.maps import FloorPlan
 from webmap.sim.messages import Messages
 from webmap.sim.obstacles import Obstacles
-from webmap.sim.world import HEIGHT, WIDTH, Camera
+from webmap.sim.world import HEIGHT, WIDTH, SimCamera
 
 
 @pytest.fixture
@@ -28,7 +28,7 @@ def room():
     solid = np.zeros((40, 60), bool)
     solid[[0, -1], :] = solid[:, [0, -1]] = True
     cells = np.where(solid, 100, 0).astype(np.int8)
-    return Camera(Obstacles(FloorPlan(cells, 0.1, 0.0, 0.0)))
+    return SimCamera(Obstacles(FloorPlan(cells, 0.1, 0.0, 0.0)))
 
 
 def wall_rows(view):

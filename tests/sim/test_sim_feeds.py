@@ -12,7 +12,7 @@ from webmap.sim.feeds.cloud import POINT, cloud_points
 from webmap.sim.feeds.localization import SURE, Belief
 from webmap.sim.feeds.navigation import Costs, distances
 from webmap.sim.maps import UNKNOWN
-from webmap.sim.navigator import Goal
+from webmap.sim.navigator import SimGoal
 from webmap.sim.obstacles import Obstacles
 
 DIALECTS = pytest.mark.parametrize("dialect", ["ros1", "ros2"])
@@ -84,7 +84,7 @@ def test_every_message_has_the_fields_of_its_definition_in_their_order(dialect):
     for topic in [*bench.graph.topics]:
         deliver = lambda each: published.setdefault(each.topic, each)  # noqa: E731
         bench.graph.subscribe(object(), topic, deliver)
-    bench.world.send_goal(0, Goal(Pose(3.0, 1.5)))
+    bench.world.send_goal(0, SimGoal(Pose(3.0, 1.5)))
     bench.run(3)
     assert len(published) > 30
     for each in published.values():
@@ -101,7 +101,7 @@ def test_the_lookahead_point_is_published_in_the_base_frame_during_a_goal(dialec
     robot.pose = Pose(2.0, 1.5, 0.4)
     topic = "/robot_0/lookahead_point"
     assert messages_of(bench, topic) == [], "the robot has no goal"
-    bench.world.send_goal(0, Goal(Pose(8.0, 1.5)))
+    bench.world.send_goal(0, SimGoal(Pose(8.0, 1.5)))
     sent = messages_of(bench, topic)[-1]
     assert sent["header"]["frame_id"] == "robot_0/base_link"
     at = robot.pose @ Pose(sent["point"]["x"], sent["point"]["y"])
@@ -330,7 +330,7 @@ def test_an_initial_pose_is_accepted_and_corrected_while_driving():
     estimate = messages_of(bench, "/robot_0/amcl_pose")[-1]["pose"]
     assert estimate["pose"]["position"]["x"] == pytest.approx(given.x)
     assert estimate["covariance"][0] == pytest.approx(0.25)
-    bench.world.send_goal(0, Goal(Pose(8.5 if robot.pose.x < 5 else 1.5, 3.0)))
+    bench.world.send_goal(0, SimGoal(Pose(8.5 if robot.pose.x < 5 else 1.5, 3.0)))
     bench.run(20)
     estimate = messages_of(bench, "/robot_0/amcl_pose")[-1]["pose"]
     at = estimate["pose"]["position"]
@@ -396,7 +396,7 @@ def test_markers_show_the_goal_and_the_visible_robots():
     assert [mark["action"] for mark in marks if mark["ns"] == "goal"] == [2, 2]
     (seen,) = [mark for mark in marks if mark["ns"] == "seen"]
     assert seen["pose"]["position"]["x"] == 5
-    bench.world.send_goal(0, Goal(Pose(8, 2, 1)))
+    bench.world.send_goal(0, SimGoal(Pose(8, 2, 1)))
     arrow, text, _ = messages_of(bench, "/robot_0/markers")[-1]["markers"]
     assert (arrow["pose"]["position"]["x"], arrow["action"]) == (8, 0)
     assert text["text"].endswith(" m")
@@ -417,7 +417,7 @@ def test_diagnostics_and_logs_report_a_low_battery_and_a_goal(dialect):
         f"{space}base: Battery": 1,
         f"{space}laser: Frequency": 0,
     }
-    bench.world.send_goal(0, Goal(Pose(2.0, 3.0)))
+    bench.world.send_goal(0, SimGoal(Pose(2.0, 3.0)))
     bench.run(1)
     bench.world.stop(0)
     bench.run(1)

@@ -20,7 +20,7 @@ from webmap.base.errors import ConfigError
 from webmap.base.lifecycle import Lifecycle
 from webmap.core.pictures import pictures
 from webmap.features.cameras import http_camera
-from webmap.ros.image_pull import Answer
+from webmap.ros.image_pull import HttpResponseParser
 from webmap.sim import run_simulator
 from webmap.sim.web_video import WebVideoServer, server
 from webmap.sim.web_video.request import Form, NoPicture, Refusal, Request, read_request
@@ -195,7 +195,7 @@ async def until(condition, seconds=10.0):
 def test_the_display_parser_reads_a_stream_and_the_server_notices_the_end():
     async def scenario(served):
         reader, writer = await served.connect(STREAM)
-        answer, seen = Answer(), []
+        answer, seen = HttpResponseParser(), []
         for picture in (a_picture(), a_picture(colour=(0, 255, 0))):
             await until(lambda: served.watchers == 1)
             served.send(picture)
@@ -255,7 +255,7 @@ def test_a_slow_reader_gets_the_newest_picture_and_few_old_pictures():
         for number in range(count):
             served.send(b"\xff\xd8\xff" + number.to_bytes(2) + bytes(size))
             await asyncio.sleep(0)
-        answer, numbers = Answer(), []
+        answer, numbers = HttpResponseParser(), []
         async with asyncio.timeout(10):
             while not numbers or numbers[-1] != count - 1:
                 found = answer.feed(await reader.read(1 << 16))

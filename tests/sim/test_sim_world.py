@@ -6,7 +6,7 @@ from simulated import room
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Pose, Twist
 from webmap.sim.maps import FLOOR, load_map
-from webmap.sim.navigator import Goal, GoalState
+from webmap.sim.navigator import GoalState, SimGoal
 from webmap.sim.world import World, WorldOptions
 
 
@@ -86,7 +86,7 @@ def test_a_robot_reaches_a_goal_behind_a_wall():
     plan = room(10, 6, boxes=[(5.0, 0.0, 5.2, 4.5)])
     world = World(plan, WorldOptions(robots=1))
     place(world, Pose(2, 2, 0.0))
-    goal = Goal(Pose(8, 2, 1.0))
+    goal = SimGoal(Pose(8, 2, 1.0))
     world.send_goal(0, goal)
     forward(world, 60, lambda: goal.state is not GoalState.ACTIVE)
     assert goal.state is GoalState.SUCCEEDED
@@ -106,7 +106,7 @@ def test_every_room_of_the_floor_can_be_reached(floor):
 
 def test_a_goal_in_a_wall_is_aborted():
     world = World(room(10, 6), WorldOptions(robots=1))
-    goal = Goal(Pose(0.1, 0.1))
+    goal = SimGoal(Pose(0.1, 0.1))
     world.send_goal(0, goal)
     forward(world, 2, lambda: goal.state is not GoalState.ACTIVE)
     assert goal.state is GoalState.ABORTED
@@ -116,7 +116,7 @@ def test_a_goal_in_a_wall_is_aborted():
 def test_cancelling_a_goal_stops_the_robot():
     world = World(room(10, 6), WorldOptions(robots=1))
     place(world, Pose(2, 3, 0.0))
-    goal = Goal(Pose(8, 3))
+    goal = SimGoal(Pose(8, 3))
     world.send_goal(0, goal)
     forward(world, 3)
     assert world.robots[0].twist.vx > 0.3
@@ -128,7 +128,7 @@ def test_cancelling_a_goal_stops_the_robot():
 
 def test_a_new_goal_cancels_the_previous_goal():
     world = World(room(10, 6), WorldOptions(robots=1))
-    first, second = Goal(Pose(8, 3)), Goal(Pose(2, 3))
+    first, second = SimGoal(Pose(8, 3)), SimGoal(Pose(2, 3))
     world.send_goal(0, first)
     forward(world, 1)
     world.send_goal(0, second)
@@ -139,7 +139,7 @@ def test_a_new_goal_cancels_the_previous_goal():
 
 def test_a_velocity_from_a_client_cancels_the_goal():
     world = World(room(10, 6), WorldOptions(robots=1))
-    goal = Goal(Pose(8, 3))
+    goal = SimGoal(Pose(8, 3))
     world.send_goal(0, goal)
     forward(world, 1)
     world.command(0, Twist(vx=0.2))
@@ -149,7 +149,7 @@ def test_a_velocity_from_a_client_cancels_the_goal():
 def test_a_zero_velocity_pauses_a_robot_without_cancelling_its_goal():
     world = World(room(10, 6), WorldOptions(robots=1))
     place(world, Pose(2, 3, 0.0))
-    goal = Goal(Pose(8, 3))
+    goal = SimGoal(Pose(8, 3))
     world.send_goal(0, goal)
     forward(world, 2)
     for _ in range(40):
@@ -163,7 +163,7 @@ def test_a_zero_velocity_pauses_a_robot_without_cancelling_its_goal():
 def test_a_robot_reaches_its_goal_around_another_robot():
     world = World(room(10, 6), WorldOptions(robots=2))
     place(world, Pose(2, 3, 0.0), Pose(4, 3, 0.0))
-    goal = Goal(Pose(8, 3))
+    goal = SimGoal(Pose(8, 3))
     world.send_goal(0, goal)
     forward(world, 60, lambda: goal.state is not GoalState.ACTIVE)
     assert goal.state is GoalState.SUCCEEDED
@@ -194,7 +194,7 @@ def test_a_velocity_from_a_client_ends_the_goal_of_a_wandering_robot(floor):
 def test_a_long_plan_is_computed_over_several_steps(floor):
     world = World(floor, WorldOptions(robots=1))
     place(world, Pose(-18, -3.0))
-    goal = Goal(Pose(16, -6.6))
+    goal = SimGoal(Pose(16, -6.6))
     world.send_goal(0, goal)
     steps = 0
     while not world.navigators[0].path:

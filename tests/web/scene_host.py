@@ -17,7 +17,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from webmap.scene import svg
 from webmap.scene.bound import Document
 from webmap.scene.node import Fragment
-from webmap.scene.wire.messages import Hello, read_message
+from webmap.scene.wire.messages import PageHello, read_message
 from webmap.scene.wire.session import SceneSession
 from webmap.server.security import CONTENT_SECURITY_POLICY
 
@@ -64,7 +64,7 @@ class Shown:
         self.session = SceneSession()
         self.document = Document()
         self.page = self.session.mount(Fragment(self.document), under=0)
-        self.hellos: list[Hello] = []
+        self.hellos: list[PageHello] = []
         self.events: list[object] = []
         self.socket: WebSocket | None = None
         self.frames = 0
@@ -176,7 +176,7 @@ class SceneHost:
         ticking: asyncio.Task[None] | None = None
         with contextlib.suppress(WebSocketDisconnect):
             hello = read_message(web_socket.query_params["hello"])
-            assert isinstance(hello, Hello)
+            assert isinstance(hello, PageHello)
             shown = self.shown.get(page_id)
             if shown is None:
                 shown = self.shown[page_id] = Shown()

@@ -48,10 +48,10 @@ from webmap.server import application
 # Loaded here once, and not again in the process of each source.
 import webmap.cli.run  # isort: skip
 import webmap.cli.discover  # isort: skip
-import webmap.fleet.found  # isort: skip
-import webmap.fleet.shown  # isort: skip
+import webmap.fleet.search  # isort: skip
+import webmap.fleet.view_robots  # isort: skip
 import webmap.cli.run  # isort: skip
-import webmap.fleet.made  # isort: skip
+import webmap.fleet.fleet_file  # isort: skip
 import webmap.cli.view  # isort: skip
 import webmap.modules.robot  # isort: skip
 

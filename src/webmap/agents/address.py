@@ -92,7 +92,7 @@ class Sender(NamedTuple):
 
     @property
     def display(self) -> str:
-        """The name of the display."""
+        """The name of the display, such as ``anna.5f3c01aa``."""
         return f"{self.user}.{self.instance}"
 
 
@@ -107,7 +107,7 @@ ANYONE = "anyone"
 """The user of a display where the router knows no users."""
 
 
-def here(agent: str) -> str:
+def beacon(agent: str) -> str:
     """Return the key of the signs that an agent is there."""
     return f"webmap/{agent}/here"
 
@@ -142,12 +142,12 @@ def topic_key(agent: str, topic: str) -> str:
     return f"webmap/{agent}/topics{topic}"
 
 
-def looks_in(agent: str, user: str, instance: str) -> str:
+def camera_in(agent: str, user: str, instance: str) -> str:
     """Return the key of the messages of a display about cameras."""
     return f"webmap/{agent}/pictures/in/{user}/{instance}"
 
 
-def looks_out(agent: str, user: str, instance: str) -> str:
+def camera_out(agent: str, user: str, instance: str) -> str:
     """Return the key of what an agent answers a display about cameras."""
     return f"webmap/{agent}/pictures/out/{user}/{instance}"
 

@@ -13,19 +13,28 @@ old sample, which the network delivers late, is no sign of life.
 import logging
 from collections import deque
 from collections.abc import Mapping
-from typing import Annotated
 
 import msgspec
 
-from webmap.agents.samples import HEAD_BYTES, Numbering, Order, head_of
+from webmap.agents.gate_messages import (
+    HEAD_BYTES,
+    MOST_PAGES,
+    FromDisplay,
+    Numbering,
+    Order,
+    PageState,
+    SampleAck,
+    StopAck,
+    ToDisplays,
+    head_of,
+)
 from webmap.base.errors import WireError
 from webmap.gate.commands import ControlCommand, Refusal, Stop, check, stop_in
-from webmap.gate.lanes.budget import FRAMES, Budget
+from webmap.gate.lanes.budget import BYTES, FRAMES, Budget
 from webmap.gate.protocol import (
     PROGRAM,
     Connect,
     Disconnect,
-    FromGate,
     FromPage,
     FromProgram,
     Hello,
@@ -63,17 +72,8 @@ A program has no inputs that it could release: after a pause of its display it w
 drive on where it was.
 """
 
-MOST_SAMPLE = 64 << 10
-"""The longest sample of a display, in bytes: the state of :data:`MOST_PAGES` pages."""
-
 MOST_COMMAND = 3 << 10
 """The longest sample of a display with a command, in bytes."""
-
-MOST_NAME = 64
-"""The longest name of a page, in characters."""
-
-MOST_PAGES = 200
-"""The greatest number of pages of one display, with its program."""
 
 MOST_PAGES_OF_USER = 1000
 """The greatest number of pages of all displays of one user."""
@@ -93,66 +93,19 @@ STOP_PAUSE = 0.05
 next tick. The gate gets one for all that wait, however many come."""
 
 
-class Page(msgspec.Struct, frozen=True, array_like=True):
-    """All that a display states of one of its pages, or of its program."""
-
-    id: Annotated[str, msgspec.Meta(max_length=32)]
-    """Its connection without the name of the display."""
-    name: Annotated[str, msgspec.Meta(max_length=MOST_NAME)]
-    role: Role
-    speeds: tuple[float, float] | None = None
-    """The speed limits of its ``Teleop``, in m/s and rad/s."""
-    greeted: bool = True
-    """Whether the display has received its :class:`Hello`."""
-
-
-class Answer(msgspec.Struct, frozen=True, tag="answer", omit_defaults=True):
-    """A display has received this sample of the agent; sent 1 to 20 times a second."""
-
-    session: int
-    number: int
-    pages: tuple[Page, ...] | None = None
-    """The program and all pages with all their state, after each change and once a
-    second: no lost sample leaves a lasting error."""
-    reports: bool = False
-    """Whether the display needs all reports, because it has lost a sample."""
-
-
-class AllReports(msgspec.Struct, frozen=True, tag="reports"):
-    """The newest report of each robot, in one sample: some of many would be lost."""
-
-    reports: tuple[RobotReport, ...]
-    robots: tuple[str, ...]
-    """All robots: a gate that has just started has reported none of them yet."""
-
-
-class Took(msgspec.Struct, frozen=True, tag="took"):
-    """The agent has received this STOP of a display."""
-
-    display: str
-    session: int
-    number: int
-
-
-ToDisplays = FromGate | AllReports | Took
-"""What an agent sends to all displays."""
-
-Passed = ToGate | Took | Hello
+Effect = ToGate | StopAck | Hello
 """What a sample of a display causes: for the gate, or for all displays."""
-
-FromDisplay = FromPage | FromProgram | Answer
-"""What a display may send. Everything else is refused whole."""
 
 _decode = msgspec.msgpack.Decoder(FromDisplay).decode
 _encode = msgspec.msgpack.Encoder().encode
 
 
-class User:
-    """A user of the router, and the displays of this user."""
+class UserDisplays:
+    """The displays of one user of the router, and what limits them together."""
 
     def __init__(self) -> None:
         self.displays: dict[str, Display] = {}
-        self.budget = Budget()
+        self.budget = Budget(FRAMES // OF_USER, BYTES // OF_USER)
         self.stops: deque[tuple[str, int, int]] = deque(maxlen=100)
         """The newest STOPs that were obeyed: display, session and number of each."""
         self.stopped_at: dict[str | None, float] = {}
@@ -162,13 +115,13 @@ class User:
 class Display:
     """What the agent knows of one display."""
 
-    def __init__(self, name: str, user: User) -> None:
+    def __init__(self, name: str, user: UserDisplays) -> None:
         self.name = name
         self.user = user
         self.program = f"{name}/{PROGRAM}"
         """The connection of its program."""
         self.order = Order()
-        self.budget = Budget()
+        self.budget = Budget(FRAMES // OF_DISPLAY, BYTES // OF_DISPLAY)
         self.alive_at = float("-inf")
         """When it was alive for certain."""
         self.pages: dict[str, list[Connect | Speeds]] = {}
@@ -177,8 +130,8 @@ class Display:
 
     def spend(self, count: int, size: int, now: float) -> None:
         """Count messages of this display, with their bytes."""
-        self.user.budget.spend(OF_USER * count, OF_USER * size, 0.0, now)
-        self.budget.spend(OF_DISPLAY * count, OF_DISPLAY * size, 0.0, now)
+        for budget in (self.user.budget, self.budget):
+            budget.spend(count, size, 0.0, now)
 
 
 class Displays:
@@ -192,7 +145,7 @@ class Displays:
 
     def __init__(self, roles: Mapping[str, Role] | None = None) -> None:
         self._roles: dict[str, Role] = dict(roles or {"": "operator"})
-        self._users = {"": User()}
+        self._users = {"": UserDisplays()}
         """Users of the router; "" is for those above :data:`MOST_USERS`."""
         self._numbering = Numbering()
         self._sent: deque[tuple[int, float]] = deque()
@@ -236,7 +189,7 @@ class Displays:
         """Return the sample that carries a message of the gate to all displays.
 
         A tick names only the pages that have sent a command: it would grow with every
-        page that looks. :class:`FarGate` adds the others.
+        page that only shows. :class:`RemoteGate` adds the others.
         """
         match message:
             case Tick(tick, acks):
@@ -260,7 +213,7 @@ class Displays:
             self._sent.popleft()
         return sample
 
-    def receive(self, name: str, sample: bytes, now: float) -> list[Passed]:
+    def receive(self, name: str, sample: bytes, now: float) -> list[Effect]:
         """Return what the gate gets from a sample of a display, and what displays get.
 
         A STOP is read before any limit and is never refused.
@@ -289,7 +242,7 @@ class Displays:
             message = _decode(sample[HEAD_BYTES:])
         except (ValueError, RecursionError) as error:
             raise WireError(f"display {name}: got no message: {error}") from error
-        if len(sample) > MOST_COMMAND and not isinstance(message, Answer):
+        if len(sample) > MOST_COMMAND and not isinstance(message, SampleAck):
             raise WireError(
                 f"display {name}: got a command of {len(sample)} bytes, "
                 f"expected {MOST_COMMAND} at most"
@@ -297,27 +250,27 @@ class Displays:
         if isinstance(message, FromProgram):
             _check_program(display, message)
         body, restarted = display.order.take(sample)
-        passed: list[Passed] = list(self._end(display)) if restarted else []
+        effects: list[Effect] = list(self._end(display)) if restarted else []
         if body is None:
-            return passed
-        if not isinstance(message, Answer):
+            return effects
+        if not isinstance(message, SampleAck):
             if message.connection in display.pages:  # otherwise it counts as lost
-                passed.append(message)
-            return passed
+                effects.append(message)
+            return effects
         self._answered(display, message)
         self._wanted |= message.reports
         if message.pages is not None:
             changed = self._update(display, message.pages, now)
             display.spend(len(changed), 0, now)
-            passed += changed
-        return passed
+            effects += changed
+        return effects
 
     def waiting_stops(self) -> list[FromProgram]:
         """Return the STOPs that wait for a tick; no acknowledgement is needed."""
         waiting, self._waiting = self._waiting, set()
         return [FromProgram(Stop(robot)) for robot in waiting]
 
-    def look(self, now: float) -> list[Disconnect]:
+    def check(self, now: float) -> list[Disconnect]:
         """Return what ends the pages of displays that give no sign of life."""
         ended: list[Disconnect] = []
         holders = dict(self._holders.values())
@@ -340,7 +293,7 @@ class Displays:
         message: FromPage | FromProgram,
         stop: Stop,
         now: float,
-    ) -> list[Passed]:
+    ) -> list[Effect]:
         """Obey a STOP, whoever sent it and whatever its number is."""
         user = self._user(name)
         session, number = head_of(sample)
@@ -356,12 +309,12 @@ class Displays:
         known = display is not None and message.connection in display.pages
         if not known or isinstance(message, FromProgram):
             message = FromProgram(Stop(robot))
-        return [message, Took(name, session, number)]  # the gate first: it must stop
+        return [message, StopAck(name, session, number)]  # the gate first: it must stop
 
-    def _user(self, display: str) -> User:
+    def _user(self, display: str) -> UserDisplays:
         name = user_of(display)
         if name not in self._users and len(self._users) <= MOST_USERS:
-            self._users[name] = User()
+            self._users[name] = UserDisplays()
         return self._users.get(name, self._users[""])
 
     def _display(self, name: str) -> Display:
@@ -382,7 +335,7 @@ class Displays:
             display = user.displays[name] = Display(name, user)
         return display
 
-    def _answered(self, display: Display, answer: Answer) -> None:
+    def _answered(self, display: Display, answer: SampleAck) -> None:
         if answer.session != self._numbering.session:
             return
         for number, at in self._sent:
@@ -390,11 +343,11 @@ class Displays:
                 display.alive_at = max(display.alive_at, at)
 
     def _update(
-        self, display: Display, pages: tuple[Page, ...], now: float
-    ) -> list[Passed]:
+        self, display: Display, pages: tuple[PageState, ...], now: float
+    ) -> list[Effect]:
         """Return what makes the pages of a display known with all their state."""
         there = {f"{display.name}/{page.id}": page for page in pages}
-        changed: list[Passed] = [
+        changed: list[Effect] = [
             self._drop(display, id) for id in list(display.pages) if id not in there
         ]
         if not display.pages:  # it answers as soon as it gets hello
@@ -420,7 +373,7 @@ class Displays:
         return changed
 
     def _state(
-        self, display: Display, connection: str, page: Page
+        self, display: Display, connection: str, page: PageState
     ) -> list[Connect | Speeds]:
         """Return the messages for a page, with at most the role of its display."""
         order: tuple[Role, ...] = ("viewer", "operator", "admin")

@@ -1,28 +1,41 @@
-"""All gates that a display reaches: its own, and those of agents.
+"""The gates of this process: all that a display reaches, or the one of an agent.
 
-Each robot belongs to one gate. A page is connected to all of them over one socket.
+Each robot belongs to one gate. A page of a display is connected to all gates over one
+socket. The displays of an agent use its gate as pages of its own would.
 """
 
 import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from functools import partial
 
 from webmap.agents import address
-from webmap.agents.far_gate import FarGate
+from webmap.agents.displays import MOST_USERS, Displays, Effect, user_of
+from webmap.agents.gate_messages import AllReports, StopAck, ToDisplays
 from webmap.agents.peer import Peer, peer_of
-from webmap.base.errors import ConfigError
+from webmap.agents.remote_gate import RemoteGate
+from webmap.base.errors import ConfigError, WireError
 from webmap.base.geometry import Twist
 from webmap.base.scope import Removal
 from webmap.gate import protocol
-from webmap.gate.commands import robot_in, stop_in
+from webmap.gate.commands import Stop, robot_in, stop_in
 from webmap.gate.display.client import DriveConnection, GateClient
-from webmap.gate.protocol import Report, RobotSpec, Role
+from webmap.gate.protocol import (
+    FromGate,
+    FromPage,
+    FromProgram,
+    Report,
+    RobotSpec,
+    Role,
+)
 from webmap.ros.names import is_agent_url
 
 log = logging.getLogger("webmap.agent")
+
+QUIET = 10.0
+"""Seconds for which no other mistake of the same user of an agent is logged."""
 
 BEAT = 0.05
 """Seconds between two signs of life for the agents."""
@@ -45,7 +58,7 @@ class PageConnection:
         self._send = send
         self._close = close
         self._speeds: tuple[float, float] | None = None
-        self._far: dict[str, DriveConnection] = {}
+        self._remote: dict[str, DriveConnection] = {}
         self._greeted = False
         self._own = gates.own.connect(name, role, self._from_own, close)
 
@@ -54,39 +67,39 @@ class PageConnection:
         data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
         client = self._gates.client_of(robot_in(data))
         if client is None and stop_in(data) is not None:
-            for far in list(self._far.values()):
-                far.receive(text)
-        for url, far in list(self._far.items()):
-            if self._gates.far.get(url) is client:
-                far.receive(text)
+            for remote in list(self._remote.values()):
+                remote.receive(text)
+        for url, remote in list(self._remote.items()):
+            if self._gates.remote.get(url) is client:
+                remote.receive(text)
                 return
         self._own.receive(text)
 
     def move(self, robot: str, x: float, y: float, yaw: float) -> None:
         """Send a goal in the name of the page; see :meth:`DriveConnection.move`."""
         client = self._gates.client_of(robot)
-        urls = [url for url in self._far if self._gates.far.get(url) is client]
-        connection = self._far[urls[0]] if urls else self._own
+        urls = [url for url in self._remote if self._gates.remote.get(url) is client]
+        connection = self._remote[urls[0]] if urls else self._own
         connection.move(robot, x, y, yaw)
 
     def set_speeds(self, v: float, w: float) -> None:
         """Set the page's own speed limits, in m/s and rad/s."""
         self._speeds = (v, w)
-        for connection in (self._own, *self._far.values()):
+        for connection in (self._own, *self._remote.values()):
             connection.set_speeds(v, w)
 
     def close(self) -> None:
         """Remove the page, which has closed; the robots that it drove stop."""
         self._gates.drop(self)
-        for connection in (self._own, *self._far.values()):
+        for connection in (self._own, *self._remote.values()):
             connection.close()
 
     def join(self, url: str, client: GateClient) -> None:
         """Connect the page to one more gate."""
         connection = client.connect(
-            self._name, self._role, self._from_far, self._close, self._own.id
+            self._name, self._role, self._from_remote, self._close, self._own.id
         )
-        self._far[url] = connection
+        self._remote[url] = connection
         if self._speeds is not None:
             connection.set_speeds(*self._speeds)
 
@@ -96,15 +109,15 @@ class PageConnection:
             return
         # The page has forgotten all robots and leases, and numbers its commands anew.
         again, self._greeted = self._greeted, True
-        for url, connection in list(self._far.items()):
-            client = self._gates.far[url]
+        for url, connection in list(self._remote.items()):
+            client = self._gates.remote[url]
             if again:
                 connection.close()
                 self.join(url, client)
             else:
                 client.show_again(connection)
 
-    def _from_far(self, text: str) -> None:
+    def _from_remote(self, text: str) -> None:
         if self._own.greeted:  # its first message is that of the display's own gate
             self._send(text)
 
@@ -115,15 +128,15 @@ class Gates:
     def __init__(self) -> None:
         self.own = GateClient()
         """The gate of this computer."""
-        self.far: dict[str, GateClient] = {}
+        self.remote: dict[str, GateClient] = {}
         """The gates of agents, by the address of the agent."""
-        self._links: dict[str, FarGate] = {}
+        self._links: dict[str, RemoteGate] = {}
         self._homes: dict[str, GateClient] = {}
         self._pages: list[PageConnection] = []
         self._listeners: list[Callable[[Report], None]] = []
         self._lock = threading.RLock()
         self._ended = threading.Event()
-        self._heart: threading.Thread | None = None
+        self._heartbeat: threading.Thread | None = None
 
     def start(self) -> None:
         """Start the gate of this computer; a second call does nothing."""
@@ -132,9 +145,9 @@ class Gates:
     def stop(self) -> None:
         """Stop every driven robot and end the gate of this computer."""
         self._ended.set()
-        if self._heart is not None:
-            self._heart.join()
-        for client in self.far.values():
+        if self._heartbeat is not None:
+            self._heartbeat.join()
+        for client in self.remote.values():
             client.stop()
         self.own.stop()
 
@@ -163,7 +176,7 @@ class Gates:
         page = PageConnection(self, name, role, send, close)
         with self._lock:
             self._pages.append(page)
-            for url, client in self.far.items():
+            for url, client in self.remote.items():
                 page.join(url, client)
         return page
 
@@ -234,7 +247,7 @@ class Gates:
     def stop_robot(self, robot_id: str | None) -> None:
         """Send STOP to a robot or, with ``None``, to all robots of all gates."""
         client = self.client_of(robot_id)
-        clients = [client] if client is not None else [self.own, *self.far.values()]
+        clients = [client] if client is not None else [self.own, *self.remote.values()]
         for each in clients:
             each.stop_robot(robot_id)
 
@@ -255,41 +268,41 @@ class Gates:
         if not is_agent_url(url):
             return self.own
         with self._lock:
-            if url not in self.far:
+            if url not in self.remote:
                 self._add(url)
-            return self.far[url]
+            return self.remote[url]
 
     def _add(self, url: str) -> None:
         agent = _agent_at(url)
-        for other in self.far:
+        for other in self.remote:
             if address.agent_in(other) == agent:
                 raise ConfigError(f"{other} has an agent {agent} already")
         peer = peer_of(url)
         user = peer.user
         display = address.Sender(user.name, user.instance).display
         key = address.gate_in(agent, user.name, user.instance)
-        links: list[FarGate] = []
+        links: list[RemoteGate] = []
 
-        def link(owner: object, lock: "threading.RLock") -> FarGate:
+        def link(owner: object, lock: "threading.RLock") -> RemoteGate:
             assert isinstance(owner, GateClient)
             links.append(
-                FarGate(agent, display, owner, lock, partial(peer.put_gate, key))
+                RemoteGate(agent, display, owner, lock, partial(peer.put_gate, key))
             )
             return links[0]
 
         client = GateClient(link, agent, f"{display}/")
         client.on_report(self._pass_on)
-        self.far[url], self._links[url] = client, links[0]
+        self.remote[url], self._links[url] = client, links[0]
         self._listen(peer, agent, links[0])
         for page in self._pages:
             page.join(url, client)
-        if self._heart is None:
-            self._heart = threading.Thread(
+        if self._heartbeat is None:
+            self._heartbeat = threading.Thread(
                 target=self._beat, name="webmap-agents-heartbeat", daemon=True
             )
-            self._heart.start()
+            self._heartbeat.start()
 
-    def _listen(self, peer: Peer, agent: str, link: FarGate) -> None:
+    def _listen(self, peer: Peer, agent: str, link: RemoteGate) -> None:
         def take(_key: str, sample: bytes) -> None:
             link.take(sample, time.monotonic())
 
@@ -312,6 +325,74 @@ class Gates:
                     link.beat(time.monotonic())
                 except Exception:
                     log.exception("the agent %s got no sign of life", link.agent)
+
+
+class AgentGate(GateClient):
+    """The gate of an agent: its own client, and the displays.
+
+    Args:
+        publish: Sends a sample to all displays, without waiting.
+        roles: What the pages of each user may do at most; see :class:`Displays`.
+
+    """
+
+    def __init__(
+        self,
+        publish: Callable[[bytes], None],
+        roles: Mapping[str, Role] | None = None,
+    ) -> None:
+        super().__init__()
+        self.displays = Displays(roles)
+        self._publish = publish
+        self._complained_at: dict[str, float] = {}
+        """When a mistake of each user was logged."""
+
+    def introduction(self) -> list[protocol.ToGate]:
+        """Return the first messages for a new gate."""
+        return [*super().introduction(), *self.displays.introduction()]
+
+    def take_sample(self, display: str, sample: bytes) -> None:
+        """Process a sample of a display, in any thread."""
+        now = time.monotonic()
+        with self._lock:
+            try:
+                messages = self.displays.receive(display, sample, now)
+            except WireError as error:
+                user = user_of(display)
+                if now - self._complained_at.get(user, float("-inf")) > QUIET:
+                    if len(self._complained_at) > MOST_USERS:
+                        self._complained_at.clear()
+                    self._complained_at[user] = now
+                    log.warning("%s", error)
+                return
+            self._pass_on(messages)
+            if self.displays.wants_reports(now):
+                reports, robots = tuple(self._pages.latest), tuple(self._specs)
+                self._send_out(AllReports(reports, robots))
+
+    def _pass_on(self, messages: Iterable[Effect]) -> None:
+        for message in messages:
+            match message:
+                case StopAck() | protocol.Hello():
+                    self._send_out(message)
+                    continue
+                case FromPage():
+                    self._keep_stop_of_page(message)
+                case FromProgram(command=Stop(robot)):
+                    self._keep_stop(None, robot)
+            self.send(message)
+
+    def hear(self, message: FromGate) -> None:
+        """Process a message from the gate, and pass it on to the displays."""
+        super().hear(message)
+        with self._lock:
+            if isinstance(message, protocol.Tick):
+                self._pass_on(self.displays.waiting_stops())
+                self._pass_on(self.displays.check(time.monotonic()))
+            self._send_out(message)
+
+    def _send_out(self, message: ToDisplays) -> None:
+        self._publish(self.displays.send(message, time.monotonic()))
 
 
 def _agent_at(url: str) -> str:

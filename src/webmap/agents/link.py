@@ -2,23 +2,25 @@
 
 import asyncio
 import logging
+import math
 import secrets
+import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
-from webmap.agents import address, data
-from webmap.agents.allowance import Allowance
-from webmap.agents.heard import Heard
+from webmap.agents import address, data_messages
 from webmap.agents.peer import Handler, Peer, peer_of
+from webmap.agents.rate_limit import UserRateLimit
 from webmap.base.errors import BridgeClosed, WireError
 from webmap.ros.bridge import LINKS
-from webmap.ros.rosbridge.connection import CLOSED_HERE, Lane, Liveness
+from webmap.ros.rosbridge.connection import CLOSED_HERE, BridgeConnection, Liveness
 from webmap.ros.rosbridge.link import RosbridgeLink
 
 log = logging.getLogger("webmap.agent")
 
-LOOK = 0.25
-"""Seconds between two looks at the connection."""
+CHECK = 0.25
+"""Seconds between two checks of the connection."""
 
 PATIENCE = 3.0
 """Seconds for the first answer of an agent, after which the attempt has failed.
@@ -26,18 +28,99 @@ PATIENCE = 3.0
 Less than a service call waits, so that it fails with the reason of the attempt.
 """
 
+RARE = 1.0
+"""Seconds between two messages of a topic from which data waits without being read."""
 
 PIECES, BYTES = 4000, 32 << 20
 """Pieces and bytes per second, packed and unpacked, that a display takes from an
 agent."""
 
 
-class AgentLane(Lane):
+class ThrottledTopic:
+    """A topic to which a connection listens, for all its subscriptions.
+
+    An agent sends each message once to all displays, as often as that display needs it
+    that needs it most. What this one needs rarely waits packed here, the newest only.
+
+    Args:
+        take: Takes a piece of data; called in the model's thread.
+        loop: The model's loop.
+
+    """
+
+    def __init__(
+        self, take: Callable[[bytes], None], loop: asyncio.AbstractEventLoop
+    ) -> None:
+        self.number: int | None = None
+        """The number of the listener at the peer."""
+        self._take = take
+        self._loop = loop
+        self._throttles: dict[str | None, float] = {}
+        self._waits = 0.0
+        self._due = -math.inf
+        self._lock = threading.Lock()
+        self._newest: bytes | None = None
+        self._timer: asyncio.TimerHandle | None = None
+
+    def subscribe(self, id: str | None, throttle: int) -> None:
+        """Add a subscription that needs a message each ``throttle`` milliseconds."""
+        self._throttles[id] = throttle / 1000
+        self._pace()
+
+    def unsubscribe(self, id: str | None) -> bool:
+        """Remove a subscription; return whether none is left."""
+        self._throttles.pop(id, None)
+        if self._throttles:
+            self._pace()
+        return not self._throttles
+
+    def arrived(self, _key: str, piece: bytes) -> None:
+        """Pass data on, or keep it until it is due; called in a thread of Zenoh."""
+        if self._loop.is_closed():
+            return
+        if self._waits < RARE:
+            self._loop.call_soon_threadsafe(self._take, piece)
+            return
+        with self._lock:
+            is_first, self._newest = self._newest is None, piece
+        if is_first:
+            self._loop.call_soon_threadsafe(self._wait)
+
+    def _wait(self) -> None:
+        if self._timer is None:
+            after = max(0.0, self._due - time.monotonic())
+            self._timer = self._loop.call_later(after, self.release)
+
+    def release(self) -> None:
+        """Pass on what waits."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        with self._lock:
+            piece, self._newest = self._newest, None
+        if piece is not None:
+            self._due = time.monotonic() + self._waits
+            self._take(piece)
+
+    def forget(self) -> None:
+        """Drop what waits: the connection or the subscription has ended."""
+        with self._lock:
+            self._newest = None
+        self.release()
+
+    def _pace(self) -> None:
+        before, self._waits = self._waits, min(self._throttles.values())
+        if self._waits < before:
+            self._due = -math.inf
+            self.release()
+
+
+class AgentConnection(BridgeConnection):
     """A connection to the rosbridge of an agent.
 
     Args:
         url: The address of the agent, ``zenoh://host:7447/name``.
-        options: The other arguments of ``Lane``.
+        options: The other arguments of ``BridgeConnection``.
 
     """
 
@@ -50,8 +133,8 @@ class AgentLane(Lane):
         self._session = ""
         self._trouble = ""
         self._listening: int | None = None
-        self._topics: dict[str, Heard] = {}
-        self._allowance = Allowance("messages", pieces=PIECES, size=BYTES)
+        self._topics: dict[str, ThrottledTopic] = {}
+        self._allowance = UserRateLimit("messages", pieces=PIECES, size=BYTES)
 
     def send(self, frame: bytes) -> None:
         """Send an operation, now.
@@ -64,14 +147,14 @@ class AgentLane(Lane):
             raise BridgeClosed(
                 f"the connection to {self.url} is not open ({self.state})"
             )
-        op = data.read_op(frame)
+        op = data_messages.read_op(frame)
         if op.op == "subscribe":
             self._listen(op)
         elif op.op == "unsubscribe":
-            heard = self._topics.get(op.topic)
-            if heard is not None and heard.unsubscribe(op.id):
+            topic = self._topics.get(op.topic)
+            if topic is not None and topic.unsubscribe(op.id):
                 self._unlisten(op.topic)
-        self._put(data.pack_frame(frame))
+        self._put(data_messages.pack_frame(frame))
 
     async def _run(self) -> None:
         self._loop = asyncio.get_running_loop()
@@ -89,25 +172,25 @@ class AgentLane(Lane):
             self._listening = peer.listen(out, self._admitted(self._arrived))
             while True:
                 self.state = "connecting"
-                if await self._reached():
+                if await self._connect():
                     reason = await self._keep_open()
                     self._end(reason)
                 if not self._again:
                     break
-                await asyncio.sleep(LOOK)
+                await asyncio.sleep(CHECK)
         except asyncio.CancelledError:
             if self.state == "open":
                 self._end(CLOSED_HERE)
             raise
         finally:
             if self._peer is not None:
-                self._put(data.pack_note(data.Bye()))
+                self._put(data_messages.pack_note(data_messages.Bye()))
                 if self._listening is not None:
                     self._peer.unlisten(self._listening)
             self.state = "closed"
             self._task = None
 
-    async def _reached(self) -> bool:
+    async def _connect(self) -> bool:
         """Ask the agent until it answers; return whether its rosbridge is there."""
         assert self._peer is not None
         self._session, self._trouble = "", ""
@@ -124,7 +207,7 @@ class AgentLane(Lane):
                 return False
             self._pings += 1
             self._ask()
-            await asyncio.sleep(LOOK)
+            await asyncio.sleep(CHECK)
         return True
 
     async def _keep_open(self) -> str:
@@ -133,8 +216,8 @@ class AgentLane(Lane):
         self.state, self._heard = "open", time.monotonic()
         self._liveness = liveness = Liveness(time.monotonic())
         self._opened()
-        heard = self._heard
-        while not liveness.is_dead(time.monotonic(), heard, busy=self._busy):
+        heard_at = self._heard
+        while not liveness.is_dead(time.monotonic(), heard_at, busy=self._busy):
             if self._session != session:
                 return self._why_no_bridge() or "the agent has connected again"
             if self._peer is not None and self._peer.trouble is not None:
@@ -144,8 +227,8 @@ class AgentLane(Lane):
                 liveness.pinged(time.monotonic())
             if liveness.is_waiting:  # a new agent did not receive the first one
                 self._ask()
-            await asyncio.sleep(LOOK)
-            heard = self._heard
+            await asyncio.sleep(CHECK)
+            heard_at = self._heard
         return f"no answer to a ping for {Liveness.LIMIT:g} s"
 
     def _why_no_bridge(self) -> str:
@@ -161,32 +244,32 @@ class AgentLane(Lane):
         self._closed(reason)
 
     def _ask(self) -> None:
-        self._put(data.pack_note(data.Ping(self._pings)))
+        self._put(data_messages.pack_note(data_messages.Ping(self._pings)))
 
     def _put(self, piece: bytes) -> None:
         assert self._peer is not None
         self._peer.put_data(self._key_in, piece, all=True)
 
-    def _listen(self, op: data.SubscribeOp) -> None:
+    def _listen(self, op: data_messages.SubscribeOp) -> None:
         if self._peer is None:
             return
-        heard = self._topics.get(op.topic)
-        if heard is None:
+        topic = self._topics.get(op.topic)
+        if topic is None:
             assert self._agent is not None
-            heard = self._topics[op.topic] = Heard(self._take, self._loop)
-            heard.subscribe(op.id, op.throttle_rate)
+            topic = self._topics[op.topic] = ThrottledTopic(self._take, self._loop)
+            topic.subscribe(op.id, op.throttle_rate)
             key = address.topic_key(self._agent, op.topic)
-            heard.number = self._peer.listen(key, self._admitted(heard.arrived))
+            topic.number = self._peer.listen(key, self._admitted(topic.arrived))
         else:
-            heard.subscribe(op.id, op.throttle_rate)
+            topic.subscribe(op.id, op.throttle_rate)
 
-    def _unlisten(self, topic: str) -> None:
-        heard = self._topics.pop(topic, None)
-        if heard is None:
+    def _unlisten(self, name: str) -> None:
+        topic = self._topics.pop(name, None)
+        if topic is None:
             return
-        if heard.number is not None and self._peer is not None:
-            self._peer.unlisten(heard.number)
-        heard.forget()
+        if topic.number is not None and self._peer is not None:
+            self._peer.unlisten(topic.number)
+        topic.forget()
 
     def _admitted(self, fn: Handler) -> Handler:
         """Return a handler that leaves out what the agent sends too much."""
@@ -208,7 +291,7 @@ class AgentLane(Lane):
 
     def _take(self, piece: bytes) -> None:
         try:
-            received = data.unpack(piece)
+            received = data_messages.unpack(piece)
         except WireError as error:
             log.warning("%s: %s", self.url, error)
             return
@@ -216,7 +299,7 @@ class AgentLane(Lane):
         if isinstance(received, bytes):
             if self.state == "open" and self._admits(received):
                 self._deliver(received)
-        elif isinstance(received, data.Pong):
+        elif isinstance(received, data_messages.Pong):
             self._session, self._trouble = received.session, received.trouble
             if self._liveness is not None and received.number == self._pings:
                 self._liveness.ponged(self._heard)
@@ -237,7 +320,7 @@ def _not_reached(url: str, why: str) -> BridgeClosed:
 class AgentLink(RosbridgeLink):
     """Topics and services of a robot's rosbridge, through its agent."""
 
-    lane_type = AgentLane
+    lane_type = AgentConnection
 
 
 for scheme in address.SCHEMES:

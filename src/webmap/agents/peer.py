@@ -8,19 +8,22 @@ find nobody by themselves and listen on nothing.
 """
 
 import atexit
-import json
 import logging
-import os
-import secrets
 import threading
 from collections import OrderedDict, deque
 from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
-from webmap.agents.address import ANYONE, checked_name, locator
-from webmap.agents.reach import why_not_reached
-from webmap.base.errors import ConfigError, WireError
+from webmap.agents.address import ANYONE, locator
+from webmap.agents.router_access import (
+    OPENING,
+    RouterUser,
+    client_settings,
+    why_not_reached,
+    zenoh_config,
+)
+from webmap.base.errors import WireError
 from webmap.base.text import one_line
 
 if TYPE_CHECKING:
@@ -37,14 +40,11 @@ COPIES = 2
 RETRY = 0.2
 """Seconds between two attempts to reach the router."""
 
-OPENING = 4.0
-"""Seconds for the router to open a session."""
-
 EXPLAIN = 25
-"""Failed attempts between two looks for the reason."""
+"""Failed attempts between two searches for the reason."""
 
-LOOK = 0.25
-"""Seconds between two looks whether the router is connected."""
+CHECK = 0.25
+"""Seconds between two checks whether the router is connected."""
 
 SMALL = 4096
 """Bytes up to which several messages of a topic may wait; of larger ones the newest."""
@@ -68,56 +68,6 @@ ASK_PATIENCE = 5.0
 """Seconds for an answer of another peer."""
 
 
-class User:
-    """Who this process is for the router.
-
-    Args:
-        name: The name of the user; "" without users.
-        password: The password.
-        ca: The file with the certificate of the authority that signed the router's, if
-            the system does not know it.
-
-    """
-
-    def __init__(self, name: str = "", password: str = "", ca: str = "") -> None:
-        self.name = checked_name(name, "user of the router") if name else ANYONE
-        self.instance = secrets.token_hex(4)
-        self.password = password
-        self.ca = ca
-
-    @property
-    def may_not(self) -> str:
-        """What to add where no agent is found: a router shows it only to its users."""
-        return (
-            "" if self.name == ANYONE else f", or the user {self.name} may not see it"
-        )
-
-    @classmethod
-    def from_environment(cls) -> Self:
-        """Return the user of the variables ``WEBMAP_ROUTER_...``."""
-        names = ("USER", "PASSWORD", "CA")
-        return cls(*(os.environ.get(f"WEBMAP_ROUTER_{name}", "") for name in names))
-
-
-def zenoh_config(**settings: Any) -> "zenoh.Config":
-    """Return a configuration that finds nobody by itself and shares no memory.
-
-    Raises:
-        ConfigError: If Zenoh is not installed.
-
-    """
-    try:
-        import zenoh
-    except ImportError:
-        raise ConfigError(
-            "agents need Zenoh, which is not installed: pip install 'webmap[fleet]'"
-        ) from None
-    closed = {
-        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
-    }
-    return zenoh.Config.from_json5(json.dumps({**closed, **settings}))
-
-
 class Peer:
     """The sessions with one router; opened again by themselves after each loss.
 
@@ -133,13 +83,13 @@ class Peer:
     """
 
     def __init__(
-        self, router: str, user: User | None = None, most: int = MOST_BYTES
+        self, router: str, user: RouterUser | None = None, most: int = MOST_BYTES
     ) -> None:
         self.locator = locator(router)
-        self.user = user or User.from_environment()
+        self.user = user or RouterUser.from_environment()
         self.trouble: str | None = f"waiting for the router at {self.locator}"
         """Why the router is not connected; None if it is."""
-        self._config = self._client_config(most)
+        self._config = client_settings(self.locator, self.user, most)
         zenoh_config()  # to fail here, not in a thread
         self._lock = threading.Lock()
         self._ended = threading.Event()
@@ -338,38 +288,6 @@ class Peer:
             except zenoh.ZError as error:
                 log.warning("%s: data was not sent: %s", self.locator, error)
 
-    def _client_config(self, most: int) -> dict[str, Any]:
-        endpoint = self.locator
-        settings: dict[str, Any] = {
-            "mode": "client",
-            "connect": {
-                "endpoints": [endpoint],
-                "timeout_ms": 0,
-                "exit_on_failure": True,
-                "retry": {
-                    "period_init_ms": 50,
-                    "period_max_ms": 200,
-                    "period_increase_factor": 2,
-                },
-            },
-        }
-        link: dict[str, Any] = {
-            "tx": {"queue": {"size": {"data": 1, "real_time": 1}}},
-            "rx": {"max_message_size": most},
-        }
-        if endpoint.startswith("tls/") and self.user.ca:
-            link["tls"] = {"root_ca_certificate": self.user.ca}
-        settings["transport"] = {
-            "link": link,
-            "unicast": {"open_timeout": int(OPENING * 1000)},
-            "shared_memory": {"enabled": False},
-        }
-        if self.user.password:
-            settings["transport"]["auth"] = {
-                "usrpwd": {"user": self.user.name, "password": self.user.password}
-            }
-        return settings
-
     def _keep(self) -> None:
         """Open the sessions, then note whether the router is connected."""
         import zenoh
@@ -386,16 +304,16 @@ class Peer:
                     self._explain()
                 failures += 1
                 self._ended.wait(RETRY)
-        self._look()  # before messages arrive, which are answered
+        self._check()  # before messages arrive, which are answered
         with self._lock:
             for number in self._handlers:
                 self._declare(number)
             for key in self._answers:
                 self._declare_answer(key)
-        while not self._ended.wait(LOOK):
-            self._look()
+        while not self._ended.wait(CHECK):
+            self._check()
 
-    def _look(self) -> None:
+    def _check(self) -> None:
         """Note whether the router is connected."""
         data = self._data is not None and self._data.info.routers_zid()
         there = data and any(session.info.routers_zid() for session in self._gate)
@@ -482,7 +400,7 @@ def peer_of(router: str, most: int = MOST_BYTES) -> Peer:
 
 
 def close_peers() -> None:
-    """Close the peers of this process."""
+    """Close the peers of this process; called at its end, may take some seconds."""
     with _peers_lock:
         for peer in _peers.values():
             peer.close()

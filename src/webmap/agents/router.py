@@ -13,8 +13,14 @@ from typing import Any
 
 import msgspec
 
-from webmap.agents.address import EVERY, checked_name, gate_in, here, locator
-from webmap.agents.displays import MOST_SAMPLE
+from webmap.agents.address import (
+    EVERY,
+    beacon,
+    checked_name,
+    gate_in,
+    locator,
+)
+from webmap.agents.gate_messages import MOST_SAMPLE
 from webmap.agents.peer import MOST_BYTES
 from webmap.base.errors import ConfigError
 
@@ -25,7 +31,7 @@ LOOPBACK = ("127.0.0.1", "[::1]", "localhost")
 
 
 class UserEntry(msgspec.Struct, forbid_unknown_fields=True):
-    """A user in the file of users."""
+    """One user: an agent, or a display with the agents that it reaches."""
 
     password: str
     agent: str = ""
@@ -155,7 +161,7 @@ def _dictionary(users: Mapping[str, UserEntry]) -> str:
 
 
 def access_rules(users: Mapping[str, UserEntry]) -> dict[str, Any]:
-    """Return the access rules of a router for its users."""
+    """Return Zenoh's ``access_control``; what no rule allows is denied."""
     rules: list[dict[str, Any]] = []
     policies: list[dict[str, Any]] = []
     for user, entry in users.items():
@@ -167,7 +173,7 @@ def access_rules(users: Mapping[str, UserEntry]) -> dict[str, Any]:
             sends = [key for each in agents for key in _keys_of_display(each, user)]
             gets = [key for each in agents for key in _keys_for_display(each, user)]
             asks, answers = [f"webmap/{each}/about/**" for each in agents], []
-            names = [*gets, here(EVERY)]  # it finds only those that it reaches
+            names = [*gets, beacon(EVERY)]  # it finds only those that it reaches
         found = [
             _rule(f"{user}-sends", ["put"], ["ingress"], sends),
             _rule(f"{user}-gets", ["put"], ["egress"], gets),

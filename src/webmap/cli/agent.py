@@ -113,7 +113,7 @@ def agent(
         run_agent,
         systemd_unit,
     )
-    from webmap.fleet.held import held_behind, held_in_file
+    from webmap.fleet.agent_robots import robots_behind, robots_in_file
     from webmap.fleet.overrides import Overrides, parse_setting
 
     if systemd:
@@ -124,11 +124,11 @@ def agent(
     throttles, most = parse_rates(rates), parse_beams(beams)
     roles = None if operators is None else parse_operators(operators)
     if "://" in robot:
-        held = held_behind(robot, robots, overrides, wait)
+        held = robots_behind(robot, robots, overrides, wait)
     elif robots or settings or stops_within is not None:
         raise click.UsageError("the fleet file has all settings of its robots")
     else:
-        held = held_in_file(Path(robot))
+        held = robots_in_file(Path(robot))
     made = Agent(name, router, held, roles=roles, throttles=throttles, beams=most)
     ended = threading.Event()
 
@@ -193,8 +193,8 @@ def router(
     from pathlib import Path
 
     from webmap.agents.address import url
-    from webmap.agents.peer import zenoh_config
     from webmap.agents.router import read_users, router_settings
+    from webmap.agents.router_access import zenoh_config
     from webmap.base.errors import ConfigError
 
     known = None if users is None else read_users(Path(users))

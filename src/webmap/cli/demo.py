@@ -123,7 +123,7 @@ def demo_of_agents(number: int, dialect: str, seed: int) -> Iterator[None]:
     """
     import webmap
     from webmap import console
-    from webmap.fleet.of_agents import find_agents
+    from webmap.fleet.remote_robots import find_agents
 
     with ExitStack() as running:
         router = running.enter_context(demo_router())

@@ -36,11 +36,11 @@ def discover(
     webmap discover ws://robot:9090 --toml > fleet.toml
     ros2 topic list -t | webmap discover ws://robot:9090 --topics -
     """
-    from webmap.agents.present import agents_behind
+    from webmap.agents.announcements import agents_behind
     from webmap.base.errors import BridgeClosed
     from webmap.discovery.fleet_toml import fleet_toml
     from webmap.discovery.tables import report
-    from webmap.fleet.find import find
+    from webmap.fleet.search import search_bridges
     from webmap.ros.names import is_agent_url
 
     one_bridge(url, topics)
@@ -56,7 +56,7 @@ def discover(
             urls += agents_behind(text, wait=wait, waiting=waiting_for(text))
         except BridgeClosed as error:
             echo(f"{error}.", err=True)
-    found = asyncio.run(find(urls, wait=wait, topics=topics))
+    found = asyncio.run(search_bridges(urls, wait=wait, topics=topics))
     if toml:
         text = fleet_toml([(one.label, one.url, one.findings) for one in found])
         click.echo(text, nl=False)  # not shortened, and escaped as TOML requires

@@ -101,12 +101,12 @@ def doctor(
         from webmap.discovery.doctor.stop_test import find_out
 
         sys.exit(find_out(url, stop_test, wait=wait, yes=yes))
-    from webmap.agents.present import agents_behind, one_agent
+    from webmap.agents.announcements import agents_behind, one_agent
     from webmap.base.errors import BridgeClosed
     from webmap.discovery.doctor import BridgeFacts, is_ready, judge
     from webmap.discovery.doctor.measure import observe
     from webmap.discovery.doctor.verdict import report
-    from webmap.fleet.diagnose import Configured, bridges_of
+    from webmap.fleet.doctor import Configured, bridges_of
 
     if len(url) == 1 and (robots or settings) and is_agent_url(url[0]):
         url = (one_agent(url[0], wait=wait, waiting=waiting_for(url[0])),)

@@ -65,8 +65,8 @@ def play(
     from webmap.bags import need_rosbags
     from webmap.bags.recording import recording_name
     from webmap.features.player.recording_player import RecordingPlayer, expect_jumps
-    from webmap.fleet.found import find_fleet
-    from webmap.fleet.overrides import Watched
+    from webmap.fleet.overrides import ViewOnly
+    from webmap.fleet.search import find_fleet
 
     need_rosbags()
     name = recording_name(files)
@@ -75,7 +75,7 @@ def play(
     with replay(*options, "--", *files) as (url, command):
         bridge = webmap.Bridge(url, name=f"recording {name}")
         bridge.replays = True
-        watched = Watched(Path(name).stem)
+        watched = ViewOnly(Path(name).stem)
         fleet = find_fleet([bridge], [], wait=5.0, overrides=watched)
         title = f"Recording {name}"
         opened = console.open_console([bridge], [], title=title, place=title)

@@ -69,7 +69,7 @@ def record(
     """
     import asyncio
 
-    from webmap.agents.present import one_agent
+    from webmap.agents.announcements import one_agent
     from webmap.bags import need_rosbags
     from webmap.bags.record import record_to, stated_types
     from webmap.ros.names import normalise_topic

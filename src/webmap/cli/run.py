@@ -25,7 +25,7 @@ def run(file: Path, host: str, port: int, no_browser: bool, insecure_lan: bool) 
     from webmap.server import application
 
     if file.suffix.lower() == ".toml":
-        from webmap.fleet.made import open_fleet, prepare
+        from webmap.fleet.fleet_file import open_fleet, prepare
 
         open_fleet(prepare(file))
         application.run(
@@ -52,7 +52,7 @@ def check(file: Path) -> None:
     No connection is opened. Every mistake is shown with its line; the exit code is 2
     if there is one.
     """
-    from webmap.fleet.made import prepare
+    from webmap.fleet.fleet_file import prepare
 
     ready = prepare(file)
     robots = counted(len(ready.robots), "robot")

@@ -100,16 +100,20 @@ def view(
 
     import webmap
     from webmap import console
-    from webmap.fleet.found import FoundFleet, find_fleet, given_fleet
-    from webmap.fleet.given import given_robots
-    from webmap.fleet.of_agents import find_agents
     from webmap.fleet.overrides import Overrides, parse_setting
+    from webmap.fleet.remote_robots import find_agents
+    from webmap.fleet.robot_options import parse_robots
+    from webmap.fleet.search import (
+        FleetSearch,
+        find_fleet,
+        fleet_of_options,
+    )
     from webmap.ros.names import is_agent_url
 
     one_bridge(url, topics)
     overrides = Overrides([parse_setting(text) for text in settings], stops_within)
     bridges = [webmap.Bridge(text) for text in url if not is_agent_url(text)]
-    given = given_robots(robots, bridges)
+    given = parse_robots(robots, bridges)
     plan = Path(floor) if floor else None
     if discover or topics is not None or not given:
         fleet = find_fleet(
@@ -121,11 +125,11 @@ def view(
         )
     else:
         overrides.check([robot.found.name for robot in given], all_known=True)
-        given = overrides.apply_to_given(given)
+        given = overrides.apply_to_options(given)
         if show and not only_given:
-            fleet = given_fleet(bridges, given, wait=wait)
+            fleet = fleet_of_options(bridges, given, wait=wait)
         else:
-            fleet = FoundFleet(given, overrides=overrides)
+            fleet = FleetSearch(given, overrides=overrides)
     if show:
         echo(fleet.table(grid=plan is None, only_given=only_given), lines=True)
         return

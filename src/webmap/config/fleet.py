@@ -276,7 +276,7 @@ def dump(
         head: Text before everything else.
 
     """
-    writer = _Writer(remarks or {}, below or {})
+    writer = _TomlWriter(remarks or {}, below or {})
     plain = {key: each for key, each in data.items() if not _is_table(each)}
     lines = writer.pairs((), plain)
     for key in ("bridges", "map", "image", "modules", "tiles", "labels", "robots"):
@@ -301,7 +301,7 @@ def _is_table(value: object) -> bool:
     )
 
 
-class _Writer:
+class _TomlWriter:
     """Writes TOML tables with comments."""
 
     def __init__(

@@ -209,7 +209,7 @@ A failed goal is shown until the next goal.
 """
 
 
-class Goal(Protocol):
+class GoalOnCard(Protocol):
     """The part of a robot's report about its goal that this module needs."""
 
     @property
@@ -261,7 +261,7 @@ class GoalLine:
         self._figures.text = figures(goal)
 
 
-def figures(goal: Goal) -> str:
+def figures(goal: GoalOnCard) -> str:
     """Return the figures of a goal in progress, with units."""
     if goal.state not in ("under way", "cancelling"):
         return ""

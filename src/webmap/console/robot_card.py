@@ -77,7 +77,7 @@ class RobotCard:
         self.notes: Element = html.div(class_="notes")
         self.more: Element = html.details(class_="more")
         self._robot: Robot | None = None
-        self._feed: Feed | None = None
+        self._feed: RobotTriggers | None = None
         self._shape = StateShape()
         self._name = html.h2(dir="auto")
         self._state = html.span(class_="holder")
@@ -114,7 +114,7 @@ class RobotCard:
         self._name.set("title", robot.name).text = robot.name
         self._battery.text = "unknown"
         self._show_age(math.inf)
-        self._feed = robot.add_module(lambda owner: Feed(owner, self))
+        self._feed = robot.add_module(lambda owner: RobotTriggers(owner, self))
         self._cameras.show(robot)
         for module in robot.modules:
             if hasattr(module, "charge"):
@@ -256,7 +256,7 @@ class RobotCard:
             self._take_arrow(self._robot)
 
 
-class Feed:
+class RobotTriggers:
     """Forwards a robot's triggers to a card; a module of robots."""
 
     def __init__(self, robot: "Robot", card: RobotCard) -> None:

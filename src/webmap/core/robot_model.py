@@ -48,7 +48,7 @@ def checked_model(name: str, model: Any, robots: Container[str]) -> Element:
     return model
 
 
-class _Shown(NamedTuple):
+class _ModelImage(NamedTuple):
     """An image whose file pages can load."""
 
     name: str
@@ -73,7 +73,7 @@ class ModelImages:
 
     def __init__(self, root: Element) -> None:
         self._root = root
-        self._shown: dict[Element, _Shown] = {}
+        self._shown: dict[Element, _ModelImage] = {}
         self._published: dict[tuple[Publisher, Path], str] = {}
 
     @property
@@ -101,7 +101,7 @@ class ModelImages:
                 url = self._publish(page, file)
             except ConfigError:
                 continue  # another server may have it; if not, the page shows an error
-            self._shown[image] = _Shown(name, file, url)
+            self._shown[image] = _ModelImage(name, file, url)
             image.set("href", url)
 
     def end(self) -> None:

@@ -127,7 +127,7 @@ class BrowserPart:
             self._channel.detach(self.instance)
 
 
-class World(Element):
+class WorldGroup(Element):
     """The group whose children are in metres, x east and y north (REP 103)."""
 
     def __init__(self) -> None:
@@ -174,7 +174,7 @@ class WorldView(Extendable):
         width, height = self.page.size_of(container)
         self._rect = Rect(0.0, 0.0, canvas_width or width, canvas_height or height)
         self.images = svg.g(class_="images")
-        self.world = World()
+        self.world = WorldGroup()
         self.world.append(self.images)
         self.world.tf = initial_view(self._rect.width, self._rect.height)
         self.root: Element = svg.svg(self.world, class_="webmap", tabindex=0)

@@ -15,36 +15,39 @@ from typing import Any
 
 import msgspec
 
-from webmap.agents import address, clients, data
+from webmap.agents import address, bridge_proxy, data_messages
 from webmap.agents.address import Sender, sender_of
-from webmap.agents.agent_gate import AgentGate
-from webmap.agents.allowance import Allowance
-from webmap.agents.cameras import AgentCameras
-from webmap.agents.clients import Call, Clients
-from webmap.agents.description import (
-    PROTOCOL,
-    About,
-    Beacon,
-    read_beacon,
-)
-from webmap.agents.displays import MOST_SAMPLE, MOST_USERS
+from webmap.agents.agent_cameras import AgentCameras
+from webmap.agents.announcements import PROTOCOL, About, Beacon, read_beacon
+from webmap.agents.bridge_proxy import BridgeProxy, Call
+from webmap.agents.data_messages import lean_scan
+from webmap.agents.displays import MOST_USERS
+from webmap.agents.gate_messages import MAX_BYTES, MOST_SAMPLE
+from webmap.agents.gates import AgentGate
 from webmap.agents.peer import MOST_CHANGES_BYTES, Peer, peer_of
-from webmap.agents.samples import MAX_BYTES
-from webmap.agents.scans import lean_scan
+from webmap.agents.rate_limit import Receiver
 from webmap.base.errors import BridgeError, ConfigError, WireError
 from webmap.base.lifecycle import lifecycle
 from webmap.base.processes import load_soon, python_command
 from webmap.base.tasks import spawn
 from webmap.core.runtime import runtime
-from webmap.fleet.held import Held, open_at, warn_of_open_bridge
-from webmap.fleet.passed_on import actions, check_parameters, passed_on
+from webmap.fleet.agent_robots import (
+    AgentRobots,
+    open_addresses,
+    warn_of_open_bridge,
+)
+from webmap.fleet.robot_files import (
+    button_actions,
+    check_parameters,
+    config_for_displays,
+)
 from webmap.gate.protocol import Role
 from webmap.poses.alignment import alignments
 from webmap.ros.names import is_type, normalise_topic
 from webmap.ros.rosbridge.calls import Calls
-from webmap.ros.rosbridge.connection import Lane
+from webmap.ros.rosbridge.connection import BridgeConnection
 from webmap.ros.rosbridge.events import Publish
-from webmap.ros.rosbridge.graph import Graph
+from webmap.ros.rosbridge.graph import BridgeGraph
 from webmap.ros.rosbridge.protocol import Protocol
 from webmap.ros.subscriptions import each_counts
 
@@ -64,12 +67,12 @@ LISTEN = 2.0
 
 
 class Agent:
-    """Holds the gate of the robots behind one rosbridge, and serves displays.
+    """Runs the gate of the robots behind one rosbridge, and serves displays.
 
     Args:
         name: The name of the agent.
         router: The address of the Zenoh router.
-        held: Its robots.
+        robots: Its robots.
         roles: What the pages of each user may do at most.
         throttles: The least milliseconds between two messages, by topic.
         beams: The greatest number of beams of a scan, by topic.
@@ -80,15 +83,15 @@ class Agent:
         self,
         name: str,
         router: str,
-        held: Held,
+        robots: AgentRobots,
         *,
         roles: Mapping[str, Role] | None = None,
         throttles: Mapping[str, int] | None = None,
         beams: Mapping[str, int] | None = None,
     ) -> None:
         self.name = address.checked_name(name)
-        self.url = url = held.bridge.url
-        self._held = held
+        self.url = url = robots.bridge.url
+        self._robots = robots
         self._session = secrets.token_hex(8)
         self._buttons: list[dict[str, str]] = []
         self._about = b""
@@ -106,13 +109,12 @@ class Agent:
         self._protocol = Protocol()
         self._calls: dict[str, Calls] = {}
         """The calls of each user: one that hangs delays no other user's."""
-        self._graph = Graph(
+        self._graph = BridgeGraph(
             lambda service, args=None, timeout=TYPES: self._calls_of("").call(
                 service, args, None, timeout
             )
         )
-        self._allowance = Allowance("messages")
-        self._clients = Clients(
+        self._proxy = BridgeProxy(
             upstream=self._upstream,
             reply=self._reply,
             note=self._note,
@@ -126,18 +128,18 @@ class Agent:
             details=lambda: _each("type", self._buttons) - {""},
             throttles=throttles,
         )
+        self._receiver = Receiver("messages", self._proxy.receive)
         self._beams = dict(beams or {})
         self._whole: set[str] = set()
         """The topics whose messages could not be read as scans."""
-        self._lane = Lane(
+        self._lane = BridgeConnection(
             url,
             opened=self._bridge_opened,
             received=self._received,
-            closed=self._clients.closed,
-            failed=lambda error: self._clients.closed(error.why or str(error)),
+            closed=self._proxy.closed,
+            failed=lambda error: self._proxy.closed(error.why or str(error)),
         )
         self._task: asyncio.Task[None] | None = None
-        self._loop: asyncio.AbstractEventLoop | None = None
         self._roles = roles
         self.gate: AgentGate | None = None
         lifecycle.add(self)
@@ -153,12 +155,12 @@ class Agent:
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Connect to the rosbridge and serve displays."""
-        self._loop = loop
+        self._receiver.start(loop)
         self._task = loop.create_task(self._run())
         self._lane.start(loop)
 
     async def stop(self) -> None:
-        """Close the connections."""
+        """Close the rosbridge's connections; the gate ends with the runtime."""
         if self._task is not None:
             self._task.cancel()
             await asyncio.wait([self._task])
@@ -172,18 +174,20 @@ class Agent:
     async def _run(self) -> None:
         peer, name = self._peer, self.name
         load_soon("numpy")  # for scans
-        peer.listen(address.here(name), self._heard_of, back=True)
+        peer.listen(address.beacon(name), self._note_beacon, back=True)
         await self._wait_for_own_name()
         everybody = address.EVERY
         peer.answer(address.about(name), lambda: self._about)
-        pictures = self._held.pictures
+        pictures = self._robots.pictures
         for picture in pictures:
             key = address.about_picture(name, picture)
             peer.answer(key, partial(pictures.__getitem__, picture))
         gate_in = address.gate_in(name, everybody, everybody)
         peer.listen(gate_in, self._sample, gate=True, most=MOST_SAMPLE)
         data_in = address.data_in(name, everybody, everybody, everybody)
-        peer.listen(data_in, self._piece, most=data.MOST_OF_DISPLAY + 1)
+        peer.listen(
+            data_in, self._receiver.receive, most=data_messages.MOST_OF_DISPLAY + 1
+        )
         typing = spawn(self._learn_types())
         self._cameras.start(asyncio.get_running_loop())
         self._serving = True
@@ -199,10 +203,10 @@ class Agent:
             beacon = Beacon(
                 PROTOCOL, self._session, hashlib.sha256(self._about).hexdigest()[:16]
             )
-            peer.put_data(address.here(name), msgspec.json.encode(beacon))
+            peer.put_data(address.beacon(name), msgspec.json.encode(beacon))
             self._note_unheard()
-            self._clients.look(time.monotonic())
-            self._cameras.look(time.monotonic())
+            self._proxy.check(time.monotonic())
+            self._cameras.check(time.monotonic())
             await asyncio.sleep(BEACON)
 
     async def _wait_for_own_name(self) -> None:
@@ -223,7 +227,7 @@ class Agent:
                     )
                 complained = True
 
-    def _heard_of(self, _key: str, piece: bytes) -> None:
+    def _note_beacon(self, _key: str, piece: bytes) -> None:
         beacon = read_beacon(piece)
         if beacon is None:
             return
@@ -249,19 +253,19 @@ class Agent:
             )
 
     def _describe(self) -> None:
-        held = self._held.robots()
-        robots = [
-            msgspec.Raw(msgspec.json.encode(passed_on(each.config).to_dict()))
-            for each in held
+        robots = self._robots.robots()
+        configs = [
+            msgspec.Raw(msgspec.json.encode(config_for_displays(each.config).to_dict()))
+            for each in robots
         ]
-        self._cameras.hold(held)
-        names = sorted({self.url, self._held.bridge.name})
-        grids = list(self._held.grids().items())
-        pose = alignments.of(self._held.bridge)
+        self._cameras.set_cameras(robots)
+        names = sorted({self.url, self._robots.bridge.name})
+        grids = list(self._robots.grids().items())
+        pose = alignments.of(self._robots.bridge)
         placed = (pose.x, pose.y, math.degrees(pose.yaw))
-        about = About(names, robots, grids, placed, self._open_at)
+        about = About(names, configs, grids, placed, self._open_at)
         self._about = msgspec.json.encode(about)
-        self._buttons = [each for one in held for each in actions(one.config)]
+        self._buttons = [each for one in robots for each in button_actions(one.config)]
 
     def _sample(self, key: str, sample: bytes) -> None:
         if self.gate is not None:
@@ -269,28 +273,13 @@ class Agent:
 
     # Data.
 
-    def _piece(self, key: str, piece: bytes) -> None:
-        client = sender_of(key)
-        if (
-            self._loop is not None
-            and not self._loop.is_closed()
-            and self._allowance.admits(client.user, len(piece), time.monotonic())
-        ):
-            self._loop.call_soon_threadsafe(self._take, client, piece)
-
-    def _take(self, client: Sender, piece: bytes) -> None:
-        try:
-            self._clients.receive(client, piece, time.monotonic())
-        except (WireError, BridgeError) as error:
-            log.warning("display %s: %s", client.display, error)
-
     def _bridge_opened(self) -> None:
         log.info("%s: the connection is open", self.url)
-        places, self._open_at = self._open_at, open_at(self.url)
+        places, self._open_at = self._open_at, open_addresses(self.url)
         if self._open_at and self._open_at != places:
             warn_of_open_bridge(self.url, self._open_at)
         self._protocol = Protocol()
-        self._clients.opened(secrets.token_hex(8), time.monotonic())
+        self._proxy.opened(secrets.token_hex(8), time.monotonic())
 
     def _upstream(self, frame: bytes) -> None:
         if self._lane.state == "open":
@@ -299,13 +288,13 @@ class Agent:
     def _received(self, frame: bytes | bytearray) -> None:
         now = time.monotonic()
         event = self._protocol.receive(frame, now)
-        if isinstance(event, Publish) and self._clients.message(
+        if isinstance(event, Publish) and self._proxy.message(
             event.topic, event.frame, now, in_parts=event.in_parts
         ):
             key = address.topic_key(self.name, event.topic)
-            type = self._clients.type_of(event.topic)
+            type = self._proxy.type_of(event.topic)
             frame = self._lean(event.topic, type, event.frame)
-            piece = data.pack_frame(frame)
+            piece = data_messages.pack_frame(frame)
             if each_counts(event.topic, type):
                 self._peer.put_data(key, piece, all=True, size=MOST_CHANGES_BYTES)
             else:
@@ -326,10 +315,10 @@ class Agent:
             return frame
 
     def _reply(self, client: Sender, frame: bytes) -> None:
-        self._put(client, data.pack_frame(frame))
+        self._put(client, data_messages.pack_frame(frame))
 
-    def _note(self, client: Sender, pong: data.Pong) -> None:
-        self._put(client, data.pack_note(pong))
+    def _note(self, client: Sender, pong: data_messages.Pong) -> None:
+        self._put(client, data_messages.pack_note(pong))
 
     def _put(self, client: Sender, piece: bytes) -> None:
         key = address.data_out(self.name, *client)
@@ -339,12 +328,12 @@ class Agent:
         """Ask the rosbridge for the types of topics that displays subscribe to."""
         while True:
             await asyncio.sleep(BEACON)
-            if self._clients.asks_types:
+            if self._proxy.asks_types:
                 try:
                     types = await self._graph.topics()
                 except BridgeError:
                     types = {}
-                self._clients.typed(types, time.monotonic())
+                self._proxy.typed(types, time.monotonic())
                 await asyncio.sleep(TYPES)
 
     def _calls_of(self, user: str) -> Calls:
@@ -359,15 +348,15 @@ class Agent:
 
     async def _answer(self, call: Call) -> None:
         try:
-            args: Any = clients.args_of(call)
+            args: Any = bridge_proxy.args_of(call)
             check_parameters(call.service, args, self._buttons)
             calls = self._calls_of(call.client.user)
             values = await calls.call(call.service, args, call.type, 30.0)
-            frame = clients.answered(call, values)
+            frame = bridge_proxy.answered(call, values)
         except (BridgeError, WireError, ValueError, TypeError) as error:
-            frame = clients.answered(call, str(error), well=False)
+            frame = bridge_proxy.answered(call, str(error), well=False)
         finally:
-            self._clients.returned(call)
+            self._proxy.returned(call)
         self._reply(call.client, frame)
 
 

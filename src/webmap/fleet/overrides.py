@@ -23,7 +23,7 @@ from webmap.discovery.findings import (
 from webmap.discovery.layers import is_own, role_of
 from webmap.discovery.robots import host_name
 from webmap.discovery.rules import VELOCITY
-from webmap.fleet.given import Candidate, check_name, set_twice
+from webmap.fleet.robot_options import Candidate, check_name, same_name_error
 from webmap.ros.names import has_gate, is_topic, is_type
 
 log = logging.getLogger("webmap.cli")
@@ -63,7 +63,7 @@ them."""
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """One setting of a robot."""
+    """One value of ``--set``."""
 
     text: str
     """The setting as written."""
@@ -157,7 +157,7 @@ class Overrides:
             config = config.with_part("twist", known)
         return config.with_part("cameras", cameras)
 
-    def apply_to_given(self, robots: Sequence[Candidate]) -> list[Candidate]:
+    def apply_to_options(self, robots: Sequence[Candidate]) -> list[Candidate]:
         """Return robots of ``--robot`` with their further settings applied.
 
         Raises:
@@ -176,7 +176,7 @@ class Overrides:
                     )
             named = _with_settings(robot.found, settings, None)
             if any(same_name(named.name) == same_name(o.found.name) for o in given):
-                raise set_twice(named.name)
+                raise same_name_error(named.name)
             given.append(Candidate(robot.bridge, named))
         return given
 
@@ -270,7 +270,7 @@ class Overrides:
         return [setting for setting in self._settings if setting.robot == name]
 
 
-class Watched(Overrides):
+class ViewOnly(Overrides):
     """No settings: every robot stays as discovery found it.
 
     Args:

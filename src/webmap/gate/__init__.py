@@ -5,8 +5,8 @@ time. Nothing that draws, serves pages or reads the robots' sensors belongs here
 
 Open ``rules`` first: all decisions, without I/O. ``protocol`` has the messages between
 display and gate, ``commands`` what a page sends, ``events`` and ``actions`` what goes
-into the rules and comes out. ``shell`` connects the rules with the sockets to the
+into the rules and comes out. ``process`` connects the rules with the sockets to the
 robots (``lanes``), the files (``disk``, ``locks``) and the pipe to the display
-(``pipe``); ``process`` is the process. ``display`` is the other end of the pipe, and
-runs in the display's process.
+(``pipe``). ``display`` is the other end of the pipe, and runs in the display's
+process.
 """

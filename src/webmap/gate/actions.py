@@ -159,7 +159,7 @@ class RunHook:
 
 @dataclass(frozen=True, slots=True)
 class SendToDisplay:
-    """Send a message to the display."""
+    """Put a message into the pipe to the display, after those that wait there."""
 
     message: FromGate
 

@@ -293,7 +293,7 @@ def check(command: ControlCommand) -> None:
 
 
 def op_of(command: Command) -> str:
-    """Return the ``op`` of a command."""
+    """Return the name of a command on the wire, which refusals repeat."""
     return str(command.__struct_config__.tag)
 
 

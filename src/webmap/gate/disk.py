@@ -174,7 +174,7 @@ class Records:
         return StopRecord(seconds, date[:MAX_NAME], late)
 
     def keep_stop_test(self, key: Key, record: StopRecord) -> None:
-        """Keep the result of a stop test."""
+        """Write the result of a stop test to the disk; an error is logged."""
         path = path_of(self._folder, key, "test")
         found = {"seconds": record.seconds, "error": record.error, "date": record.date}
         try:

@@ -91,7 +91,7 @@ class PingAnswered:
 
 @dataclass(frozen=True, slots=True)
 class TwistWritten:
-    """The result of a ``WriteTwist``."""
+    """A ``WriteTwist`` was done or dropped; comes before any other event."""
 
     key: Key
     twist: Twist
@@ -103,7 +103,7 @@ class TwistWritten:
 
 @dataclass(frozen=True, slots=True)
 class GoalWritten:
-    """The result of a ``SendGoal``."""
+    """A ``SendGoal`` was done or dropped; the robot has not answered yet."""
 
     robot: str
     id: str
@@ -116,7 +116,7 @@ class GoalWritten:
 
 @dataclass(frozen=True, slots=True)
 class PoseWritten:
-    """The result of a ``SendPose``."""
+    """A ``SendPose`` was done or dropped; robots do not answer a pose."""
 
     robot: str
     x: float
@@ -167,7 +167,7 @@ class GoalLost:
 
 @dataclass(frozen=True, slots=True)
 class HookEnded:
-    """The result of a ``RunHook``."""
+    """A ``RunHook`` has ended: the message was written, or the service answered."""
 
     robot: str
     hook: dict[str, str]
@@ -200,7 +200,7 @@ class OdometryReceived:
 
 @dataclass(frozen=True, slots=True)
 class ScanReceived:
-    """A laser scan was received."""
+    """A scan of a watched machine was received, folded to 720 beams at most."""
 
     key: Key
     topic: str
@@ -209,7 +209,7 @@ class ScanReceived:
 
 @dataclass(frozen=True, slots=True)
 class StopRecord:
-    """The result of a stop test."""
+    """The result of a stop test, as it is kept on disk."""
 
     seconds: float | None
     """Seconds from the last command to standstill; ``None`` if it did not stop."""
@@ -247,7 +247,7 @@ class StopFileChanged:
 
 @dataclass(frozen=True, slots=True)
 class StopSaved:
-    """The result of a ``SaveStop``."""
+    """A ``SaveStop`` was written to the disk, or failed."""
 
     key: Key
     number: int

@@ -86,7 +86,7 @@ OVERFULL = 20_000
 """With more messages than this waiting, every new one is dropped."""
 
 
-class Outbox:
+class PipeWriter:
     """Writes messages to a pipe in a thread of its own.
 
     Args:

@@ -26,7 +26,7 @@ Point = tuple[float, float]
 
 
 class AssistSpec(msgspec.Struct, frozen=True, kw_only=True):
-    """The scan assist of a robot."""
+    """What scan assist needs to know of a robot."""
 
     topic: str
     """The topic of its ``sensor_msgs/LaserScan``."""
@@ -204,7 +204,7 @@ ToGate = (
 
 
 class Holder(msgspec.Struct, frozen=True):
-    """The holder of the lease of a robot."""
+    """The connection that has control of a robot, and its name for people."""
 
     connection: str
     name: str
@@ -220,7 +220,7 @@ class AskerReport(msgspec.Struct, frozen=True):
 
 
 class StopReport(msgspec.Struct, frozen=True):
-    """The state of an active STOP."""
+    """Who pressed an active STOP, and whether the robot stands."""
 
     by: str
     """The name of who pressed STOP."""
@@ -368,7 +368,7 @@ MAY_MOVE = (
 
 
 class RobotGone(msgspec.Struct, frozen=True, tag="gone"):
-    """The robot was removed."""
+    """The gate has forgotten the robot; no report of it follows."""
 
     robot: str
 
@@ -394,7 +394,7 @@ class Tick(msgspec.Struct, frozen=True, tag="tick"):
 
 
 class Refused(msgspec.Struct, frozen=True, tag="refused"):
-    """A command was refused."""
+    """A command was not executed; its page shows why."""
 
     connection: str
     robot: str | None

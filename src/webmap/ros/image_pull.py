@@ -108,7 +108,7 @@ class Pull:
 
     async def _read(self, reader: asyncio.StreamReader) -> bool:
         now = asyncio.get_running_loop().time
-        answer, deadline = Answer(), now() + self._patience
+        answer, deadline = HttpResponseParser(), now() + self._patience
         while True:
             due = self._shown_at + self._throttle
             waits = self._newest is not None and due < deadline
@@ -167,7 +167,7 @@ _STATUS_REASONS = {
 }
 
 
-class Answer:
+class HttpResponseParser:
     """Parser of an HTTP answer, of a stream or of a single picture."""
 
     def __init__(self) -> None:

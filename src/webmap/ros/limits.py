@@ -27,7 +27,7 @@ class TooLarge(ProtocolError):
     """A message is larger than its type may be."""
 
 
-class Limit(NamedTuple):
+class SizeLimit(NamedTuple):
     """Size limit of the messages of a type, with its reason."""
 
     size: int
@@ -40,32 +40,32 @@ class Limit(NamedTuple):
     """What a person can do about a larger message."""
 
 
-GENERAL = Limit(
+GENERAL = SizeLimit(
     4 * MIB,
     "room for 10,000 poses, transforms or markers, which is more than a page can show",
     "publish less at a time, or on several topics",
 )
 
-_GRID = Limit(
+_GRID = SizeLimit(
     64 * MIB,
     "a map of 64 million cells has this size in a binary encoding",
     "publish a coarser map, or a part of it",
 )
 
-LIMITS: dict[str, Limit] = {
+LIMITS: dict[str, SizeLimit] = {
     "nav_msgs/OccupancyGrid": _GRID,
     "map_msgs/OccupancyGridUpdate": _GRID,
-    "sensor_msgs/PointCloud2": Limit(
+    "sensor_msgs/PointCloud2": SizeLimit(
         64 * MIB,
         "a cloud of 4 million points of 16 bytes has this size in a binary encoding",
         "thin the cloud on the robot, for instance with a voxel filter",
     ),
-    "sensor_msgs/Image": Limit(
+    "sensor_msgs/Image": SizeLimit(
         64 * MIB,
         "a picture of 16 million pixels in three colours has 48 MiB",
         "publish a smaller picture, or a compressed one",
     ),
-    "sensor_msgs/CompressedImage": Limit(
+    "sensor_msgs/CompressedImage": SizeLimit(
         8 * MIB,
         "a picture of 4 MiB has 6 MiB as text, which writes it in base64",
         "publish a smaller picture, or compress it more",
@@ -87,7 +87,7 @@ _VIEWS = {"ShownAnyImageMsg": "sensor_msgs/Image"}
 """The types of views that may be used when no type is stated."""
 
 
-def limit_of(type: str | None, views: Iterable[object] = ()) -> Limit:
+def limit_of(type: str | None, views: Iterable[object] = ()) -> SizeLimit:
     """Return the limit of a topic.
 
     Args:
@@ -102,7 +102,7 @@ def limit_of(type: str | None, views: Iterable[object] = ()) -> Limit:
     return GENERAL if type is None else LIMITS.get(str(split_type(type)), GENERAL)
 
 
-def check_size(size: int, limit: Limit, type: str | None) -> None:
+def check_size(size: int, limit: SizeLimit, type: str | None) -> None:
     """Check the size of a message against the limit of its type.
 
     Args:

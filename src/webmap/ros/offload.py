@@ -20,8 +20,8 @@ from webmap.ros.received import ReceivedMessage
 from webmap.ros.worker import (
     LENGTH,
     MAX_MESSAGE,
-    Answer,
-    Request,
+    WorkRequest,
+    WorkResult,
     item_type,
     view_name,
 )
@@ -41,7 +41,7 @@ MOST_WAITING = 16
 class Reply(NamedTuple):
     """An answer, its parts, and how long the worker was busy with it."""
 
-    answer: Answer
+    answer: WorkResult
     parts: list[bytearray]
     seconds: float
 
@@ -70,7 +70,7 @@ class _Worker:
         """Held while a part of an answer is processed; others wait in order."""
 
     async def ask(
-        self, request: Request, data: bytes | bytearray | memoryview
+        self, request: WorkRequest, data: bytes | bytearray | memoryview
     ) -> Reply:
         """Return the worker's answer to a request; a failure is an answer, too."""
         async with self._turn:
@@ -80,15 +80,15 @@ class _Worker:
                     answer, parts = await self._ask(request, data)
             except _WORKER_FAILURES as error:
                 await self.stop()
-                answer, parts = Answer(error=f"its decoder ended: {error!r}"), []
+                answer, parts = WorkResult(error=f"its decoder ended: {error!r}"), []
             except asyncio.CancelledError:
                 await self.stop()  # the next request would get this answer
                 raise
             return Reply(answer, parts, time.monotonic() - began)
 
     async def _ask(
-        self, request: Request, data: bytes | bytearray | memoryview
-    ) -> tuple[Answer, list[bytearray]]:
+        self, request: WorkRequest, data: bytes | bytearray | memoryview
+    ) -> tuple[WorkResult, list[bytearray]]:
         process = self._process
         if process is None or process.returncode is not None:
             process = self._process = await _start()
@@ -105,7 +105,7 @@ class _Worker:
         if length > CHUNK:
             raise EOFError(f"an answer of {length} bytes")
         head = await process.stdout.readexactly(length)
-        answer = msgspec.msgpack.decode(head, type=Answer)
+        answer = msgspec.msgpack.decode(head, type=WorkResult)
         if sum(answer.sizes) > MAX_MESSAGE:
             raise EOFError(f"an answer of {sum(answer.sizes)} bytes")
         return answer, [await _read(process.stdout, size) for size in answer.sizes]
@@ -144,7 +144,7 @@ async def _read(stream: asyncio.StreamReader, size: int) -> bytearray:
     return found
 
 
-def values(answer: Answer, parts: list[bytearray], type: Any) -> Iterator[Any]:
+def values(answer: WorkResult, parts: list[bytearray], type: Any) -> Iterator[Any]:
     """Build the value of an answer, one step for each received part.
 
     Yields:
@@ -242,7 +242,7 @@ async def aside(
 
     """
     user, name = object(), view_name(function)
-    request = Request(len(data), call=name, arguments=list(arguments))
+    request = WorkRequest(len(data), call=name, arguments=list(arguments))
     worker = _acquire(user)
     try:
         reply = await worker.ask(request, data)
@@ -332,7 +332,7 @@ class Offload:
                     await asyncio.sleep(wait)
                     if _is_late(job, waiting):
                         return
-                request = Request(
+                request = WorkRequest(
                     len(message.frame),
                     message.topic,
                     view_name(message.__class__),

@@ -36,7 +36,7 @@ PIECE = 32
 """Items of a long list that are delivered at a time: a few milliseconds of work."""
 
 
-class Request(msgspec.Struct, array_like=True):
+class WorkRequest(msgspec.Struct, array_like=True):
     """One frame to decode, or a function to call with bytes."""
 
     size: int
@@ -56,7 +56,7 @@ class Request(msgspec.Struct, array_like=True):
     """The further arguments of the function."""
 
 
-class Answer(msgspec.Struct, array_like=True):
+class WorkResult(msgspec.Struct, array_like=True):
     """The result of a request; the bytes of each part follow, one after the other."""
 
     sizes: list[int] = []
@@ -82,12 +82,12 @@ def view_name(thing: Any) -> str | None:
     return f"{thing.__module__}:{thing.__qualname__}"
 
 
-def answer(request: Request, data: bytes) -> tuple[Answer, list[bytes]]:
+def answer(request: WorkRequest, data: bytes) -> tuple[WorkResult, list[bytes]]:
     """Return the answer to a request, and its parts."""
     try:
         if request.call is not None:
             made = _named(request.call)(data, *request.arguments)
-            return Answer([len(made)]), [made]
+            return WorkResult([len(made)]), [made]
         received = _named(request.message)(request.topic, data)
         received.check_count()
         view = _named(request.view)
@@ -95,13 +95,13 @@ def answer(request: Request, data: bytes) -> tuple[Answer, list[bytes]]:
         if hasattr(view, "digest"):
             message = message.digest()
         field, parts = _parts(message)
-        return Answer([len(part) for part in parts], field), parts
+        return WorkResult([len(part) for part in parts], field), parts
     except MemoryError:
-        return Answer(error="it takes too much memory to be decoded"), []
+        return WorkResult(error="it takes too much memory to be decoded"), []
     except ProtocolError as error:
-        return Answer(error=str(error), kind=type(error).__name__), []
+        return WorkResult(error=str(error), kind=type(error).__name__), []
     except Exception as error:  # the worker must survive any data
-        return Answer(error=f"it cannot be decoded: {error!r}"), []
+        return WorkResult(error=f"it cannot be decoded: {error!r}"), []
 
 
 def _named(name: str | None) -> Any:
@@ -159,7 +159,7 @@ def _enc_hook(value: Any) -> Any:
 _encode = msgspec.msgpack.Encoder(enc_hook=_enc_hook).encode
 
 
-def read(stream: BinaryIO) -> tuple[Request, bytes] | None:
+def read(stream: BinaryIO) -> tuple[WorkRequest, bytes] | None:
     """Return the next request of the stream and its bytes, or None at its end."""
     head = stream.read(LENGTH.size)
     if len(head) < LENGTH.size:
@@ -168,7 +168,7 @@ def read(stream: BinaryIO) -> tuple[Request, bytes] | None:
     body = stream.read(length)
     if len(body) < length:
         return None
-    request = msgspec.msgpack.decode(body, type=Request)
+    request = msgspec.msgpack.decode(body, type=WorkRequest)
     data = stream.read(request.size)
     return (request, data) if len(data) == request.size else None
 

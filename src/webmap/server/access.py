@@ -181,7 +181,7 @@ def _headers(scope: Scope, name: bytes) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class Refusal:
+class AccessRefusal:
     """A refused request."""
 
     status: int
@@ -220,16 +220,16 @@ class AccessControl:
         self._attempts = Attempts()
         self.codes = Codes()
 
-    def check_address(self, request: RequestHead) -> Refusal | None:
+    def check_address(self, request: RequestHead) -> AccessRefusal | None:
         """Refuse a request for another host, or from a page of another origin."""
         if not self._settings.hosts.allow(request.host):
-            return Refusal(
+            return AccessRefusal(
                 421,
                 "WebMap does not accept this host name. Open the address that WebMap "
                 "printed at its start, or add this name to the hosts of WebMap.",
             )
         if request.changes and not self._is_own_origin(request):
-            return Refusal(
+            return AccessRefusal(
                 403,
                 "Expected a request from a page of WebMap, got a request from another "
                 "origin.",
@@ -238,7 +238,7 @@ class AccessControl:
 
     def identify(
         self, request: RequestHead, now: float
-    ) -> Viewer | Redirect | SignedIn | Refusal:
+    ) -> Viewer | Redirect | SignedIn | AccessRefusal:
         """Return who makes a request, by cookie, key, token or code.
 
         Sockets, and requests that may change something, need a page's key. For all
@@ -250,10 +250,10 @@ class AccessControl:
 
         """
         if request.changes:
-            return self._key_holder(request) or Refusal(401, NOT_SIGNED_IN)
+            return self._key_holder(request) or AccessRefusal(401, NOT_SIGNED_IN)
         viewer = self._cookie_holder(request)
         if not request.reads:
-            return viewer or Refusal(401, "Sign in first.")
+            return viewer or AccessRefusal(401, "Sign in first.")
         if any(self.codes.use(code, now) for code in request.codes()):
             return self._sign_in(request, viewer)
         tokens = request.tokens()
@@ -267,23 +267,23 @@ class AccessControl:
         if tokens:
             return self._refuse_token(request, now)
         if request.codes():
-            return Refusal(
+            return AccessRefusal(
                 401,
                 "This address has expired: it works once and only for a short time.",
             )
-        return Refusal(401, "Sign in first.")
+        return AccessRefusal(401, "Sign in first.")
 
-    def _refuse_token(self, request: RequestHead, now: float) -> Refusal:
+    def _refuse_token(self, request: RequestHead, now: float) -> AccessRefusal:
         wait = self._attempts.wait(request.address, now)
         if wait:
-            return Refusal(
+            return AccessRefusal(
                 429,
                 "Too many wrong tokens from your address. The token in the address "
                 f"that WebMap printed works now; try other tokens after {wait} s.",
                 retry_after=wait,
             )
         self._attempts.failed(request.address, now)
-        return Refusal(
+        return AccessRefusal(
             401,
             "Wrong token. Without a fixed token, WebMap makes a new token at each "
             "start.",

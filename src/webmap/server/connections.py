@@ -124,8 +124,10 @@ class Crowds:
     """All waiting connections of one server."""
 
     def __init__(self) -> None:
-        self.strangers: Waiting[Connection] = Waiting(STRANGERS, STRANGERS_PER_ADDRESS)
-        self.signed_in: Waiting[Connection] = Waiting(SIGNED_IN, SIGNED_IN)
+        self.strangers: Waiting[HttpConnection] = Waiting(
+            STRANGERS, STRANGERS_PER_ADDRESS
+        )
+        self.signed_in: Waiting[HttpConnection] = Waiting(SIGNED_IN, SIGNED_IN)
         self._logged = float("-inf")
 
     def log_full(self, now: float) -> None:
@@ -138,7 +140,7 @@ class Crowds:
             )
 
 
-class Connection:
+class HttpConnection:
     """One connection, from its acceptance to its end.
 
     Args:
@@ -150,7 +152,7 @@ class Connection:
     def __init__(self, transport: asyncio.Transport, crowds: Crowds) -> None:
         self._transport = transport
         self._crowds = crowds
-        self._crowd: Waiting[Connection] | None = None
+        self._crowd: Waiting[HttpConnection] | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._ended = False
         peer = transport.get_extra_info("peername")
@@ -180,7 +182,7 @@ class Connection:
         else:
             self._wait_in(self._crowds.signed_in)
 
-    def _wait_in(self, crowd: "Waiting[Connection]") -> None:
+    def _wait_in(self, crowd: "Waiting[HttpConnection]") -> None:
         self._crowd = crowd
         self._timer = _loop().call_later(WAITING_S, self._end, crowd)
         other = crowd.add(self, self._origin)
@@ -197,7 +199,7 @@ class Connection:
             self._crowd.remove(self, self._origin)
             self._crowd = None
 
-    def _end(self, crowd: "Waiting[Connection]") -> None:
+    def _end(self, crowd: "Waiting[HttpConnection]") -> None:
         self._leave()
         if crowd is self._crowds.strangers:
             self._transport.abort()
@@ -251,9 +253,9 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         super().send_receive_event_to_app()
 
 
-def connection_of(scope: Scope) -> Connection | None:
+def connection_of(scope: Scope) -> HttpConnection | None:
     """Return the connection of a request; None if another server accepted it."""
-    return cast(Connection | None, scope.get("state", {}).get(_KEY))
+    return cast(HttpConnection | None, scope.get("state", {}).get(_KEY))
 
 
 def protocols() -> tuple[type[H11Protocol], type[WebSocketProtocol]]:
@@ -265,7 +267,7 @@ def protocols() -> tuple[type[H11Protocol], type[WebSocketProtocol]]:
 
         def connection_made(self, transport: Any) -> None:
             super().connection_made(transport)
-            self.app_state = {**self.app_state, _KEY: Connection(transport, crowds)}
+            self.app_state = {**self.app_state, _KEY: HttpConnection(transport, crowds)}
 
         def connection_lost(self, exc: Exception | None) -> None:
             self.app_state[_KEY].ended()

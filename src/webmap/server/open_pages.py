@@ -27,10 +27,10 @@ from webmap.core.world_view import Rect
 from webmap.scene.element import Event
 from webmap.scene.wire.messages import (
     ElementEvent,
-    Hello,
     ModuleMessage,
     ModuleReady,
     PageEvent,
+    PageHello,
     Trouble,
     ViewReport,
 )
@@ -143,7 +143,7 @@ class PageHost:
 
     def _receive(self, event: PageEvent) -> None:
         match event:
-            case Hello(containers=sizes):
+            case PageHello(containers=sizes):
                 self._hello(sizes)
             case ElementEvent():
                 self._element_event(event)

@@ -55,7 +55,7 @@ REPLACED = 4001
 
 
 @dataclass(frozen=True, slots=True)
-class Bounds:
+class SocketLimits:
     """The limits of one socket."""
 
     max_bytes: int
@@ -68,9 +68,9 @@ class Bounds:
     """Messages at once. A connection that stalled delivers its queue at once."""
 
 
-SCENE = Bounds(max_bytes=16 * 1024, rate=120.0, burst=240.0)
+SCENE = SocketLimits(max_bytes=16 * 1024, rate=120.0, burst=240.0)
 # 20 commands a second for the 6 s after which a silent connection is given up.
-DRIVE = Bounds(max_bytes=1024, rate=60.0, burst=120.0)
+DRIVE = SocketLimits(max_bytes=1024, rate=60.0, burst=120.0)
 
 OPENS = 2.0
 """Pages that one viewer may open each second."""
@@ -112,7 +112,7 @@ class Allowance:
 
     __slots__ = ("_bounds", "_left", "_then")
 
-    def __init__(self, bounds: Bounds, now: float) -> None:
+    def __init__(self, bounds: SocketLimits, now: float) -> None:
         self._bounds = bounds
         self._left = bounds.burst
         self._then = now
@@ -166,7 +166,7 @@ class PageSocket:
         socket: WebSocket,
         name: str,
         calls: BatchedCalls,
-        bounds: Bounds,
+        bounds: SocketLimits,
         queue: FrameQueue | DriveQueue,
     ) -> None:
         self._socket = socket

@@ -13,8 +13,8 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from webmap.core.base_page import Viewer
 from webmap.server.access import (
     AccessControl,
+    AccessRefusal,
     Redirect,
-    Refusal,
     RequestHead,
     Settings,
     SignedIn,
@@ -80,7 +80,7 @@ def plain(status: int, text: str) -> Response:
     return PlainTextResponse(f"{status} {phrase}\n\n{text}\n", status)
 
 
-def refuse(refusal: Refusal, *, wants_html: bool) -> Response:
+def refuse(refusal: AccessRefusal, *, wants_html: bool) -> Response:
     """Return the answer to a refused request."""
     if refusal.status == HTTPStatus.UNAUTHORIZED and wants_html:
         return sign_in_page(refusal.text, refusal.status)
@@ -155,7 +155,7 @@ class Security:
 
     async def _who(
         self, request: RequestHead, scope: Scope
-    ) -> Viewer | Redirect | SignedIn | Refusal:
+    ) -> Viewer | Redirect | SignedIn | AccessRefusal:
         refusal = self._access.check_address(request)
         if refusal is not None:
             return refusal
@@ -164,7 +164,7 @@ class Security:
         viewer = self._authenticate(scope)
         if inspect.isawaitable(viewer):
             viewer = await viewer
-        return viewer or Refusal(403, "Your account has no access to WebMap.")
+        return viewer or AccessRefusal(403, "Your account has no access to WebMap.")
 
 
 async def _deny(answer: Response, scope: Scope, receive: Receive, send: Send) -> None:
@@ -177,7 +177,7 @@ async def _deny(answer: Response, scope: Scope, receive: Receive, send: Send) ->
         await send({"type": "websocket.close", "code": 1008, "reason": ""})
 
 
-def _log_refusal(refusal: Refusal, request: RequestHead, scope: Scope) -> None:
+def _log_refusal(refusal: AccessRefusal, request: RequestHead, scope: Scope) -> None:
     if refusal.status == 401 and not request.tokens():
         return
     # With repr, so that a request cannot write its own lines into the log.

@@ -6,8 +6,8 @@ from typing import Any
 
 from webmap.ros.rosbridge.server.encode import Publication
 from webmap.ros.rosbridge.server.graph import GoalHandle, Respond
-from webmap.sim.graph_node import Node
-from webmap.sim.navigator import Goal, GoalState
+from webmap.sim.graph_node import GraphNode
+from webmap.sim.navigator import GoalState, SimGoal
 
 _ACTIONLIB_STATUS = {
     GoalState.ACTIVE: 1,
@@ -21,7 +21,7 @@ _KEPT = 5.0
 
 
 class _Tracked:
-    def __init__(self, goal_id: dict[str, Any], goal: Goal | None) -> None:
+    def __init__(self, goal_id: dict[str, Any], goal: SimGoal | None) -> None:
         self.goal_id = goal_id
         self.goal = goal
         self.ended_at: float | None = None
@@ -35,7 +35,7 @@ class _Tracked:
 class ActionlibServer:
     """Receives goals and cancels by topic, and publishes their progress."""
 
-    def __init__(self, node: Node, index: int, prefix: str) -> None:
+    def __init__(self, node: GraphNode, index: int, prefix: str) -> None:
         self.node = node
         self.index = index
         self.topic = f"{prefix}/move_base"
@@ -92,7 +92,7 @@ class ActionlibServer:
             self._goals.append(tracked)
             self._end(tracked)
             return
-        goal = Goal(target, lambda _: self._end(tracked))
+        goal = SimGoal(target, lambda _: self._end(tracked))
         tracked = _Tracked(goal_id, goal)
         self._goals.append(tracked)
         self.node.world.send_goal(self.index, goal)
@@ -166,7 +166,7 @@ class NavigateToPose:
 
     type = "nav2_msgs/NavigateToPose"
 
-    def __init__(self, node: Node, index: int, prefix: str) -> None:
+    def __init__(self, node: GraphNode, index: int, prefix: str) -> None:
         self.node = node
         self.index = index
         self.action = f"{prefix}/navigate_to_pose"
@@ -201,7 +201,7 @@ class NavigateToPose:
         if target is None:
             return None
         handle = _Handle(self, on_feedback, on_result, self.node.world.now)
-        handle.goal = Goal(target, handle.end)
+        handle.goal = SimGoal(target, handle.end)
         self._running[handle.uuid] = handle
         self.node.world.send_goal(self.index, handle.goal)
         return handle
@@ -258,7 +258,7 @@ class _Handle:
         started_at: float,
     ) -> None:
         self.uuid = uuid.uuid4().bytes
-        self.goal: Goal | None = None
+        self.goal: SimGoal | None = None
         self.on_feedback = on_feedback
         self.started_at = started_at
         self._server = server
@@ -269,7 +269,7 @@ class _Handle:
         if self.goal is not None and navigator.goal is self.goal:
             navigator.cancel("canceled")
 
-    def end(self, goal: Goal) -> None:
+    def end(self, goal: SimGoal) -> None:
         self._server.forget(self)
         failed = goal.state is GoalState.ABORTED
         result = _result(goal.text if failed else "")

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from random import Random
 
 from webmap.base.geometry import Pose
-from webmap.sim.navigator import Goal, Navigator
+from webmap.sim.navigator import Navigator, SimGoal
 
 QUIET = 60.0
 """Seconds without a command of a client until a robot continues its errands."""
@@ -41,7 +41,7 @@ class Errands:
         self._navigators = navigators
         self._stations = stations
         self._random = Random(seed)  # noqa: S311 - reproducible by design
-        self._goals: dict[int, Goal] = {}
+        self._goals: dict[int, SimGoal] = {}
         # After the start of the display, which needs the processor too, and one robot
         # after the other, so that their plans do not wait.
         self._due = {index: REST + place for place, index in enumerate(robots)}
@@ -84,7 +84,7 @@ class Errands:
     def _send(self, index: int) -> None:
         free = [station for station in self._stations if self._is_free(station)]
         if free:
-            goal = self._goals[index] = Goal(self._random.choice(free))
+            goal = self._goals[index] = SimGoal(self._random.choice(free))
             self._navigators[index].send(goal)
 
     def _is_free(self, station: Pose) -> bool:

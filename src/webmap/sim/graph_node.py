@@ -14,7 +14,7 @@ log = logging.getLogger("webmap.sim")
 NODE = "/robots"
 
 
-class Node:
+class GraphNode:
     """Publishes and subscribes for simulated robots.
 
     Args:

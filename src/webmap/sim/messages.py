@@ -12,7 +12,7 @@ from webmap.ros.tf import Transform
 from webmap.sim.maps import FloorPlan
 from webmap.sim.mounts import LASER_HEIGHT, mount
 from webmap.sim.planner import Point
-from webmap.sim.robot import Robot
+from webmap.sim.robot import SimRobot
 from webmap.sim.scanner import ScannerOptions
 
 Message = dict[str, Any]
@@ -41,7 +41,7 @@ class Messages:
         if nan:
             self._covariance[1] = math.nan
 
-    def odometry(self, topic: str, stamp: float, robot: Robot) -> Message:
+    def odometry(self, topic: str, stamp: float, robot: SimRobot) -> Message:
         """Return ``nav_msgs/Odometry``."""
         frames = robot.frames
         return {
@@ -61,7 +61,7 @@ class Messages:
         self,
         topic: str,
         stamp: float,
-        robot: Robot,
+        robot: SimRobot,
         options: ScannerOptions,
         ranges: NDArray[np.float32],
     ) -> Message:
@@ -80,7 +80,7 @@ class Messages:
             "intensities": np.empty(0, np.float32),
         }
 
-    def camera(self, topic: str, stamp: float, robot: Robot, jpeg: bytes) -> Message:
+    def camera(self, topic: str, stamp: float, robot: SimRobot, jpeg: bytes) -> Message:
         """Return ``sensor_msgs/CompressedImage``."""
         return {
             "header": self.dialect.header(topic, stamp, f"{robot.frames}camera"),
@@ -88,7 +88,7 @@ class Messages:
             "data": jpeg,
         }
 
-    def battery(self, topic: str, stamp: float, robot: Robot) -> Message:
+    def battery(self, topic: str, stamp: float, robot: SimRobot) -> Message:
         """Return ``sensor_msgs/BatteryState``; unmeasured values are NaN."""
         nothing = np.empty(0, np.float32)
         return {
@@ -125,7 +125,7 @@ class Messages:
         return {"header": self.dialect.header("", stamp, "map"), "pose": pose(at)}
 
     def transforms(
-        self, topic: str, stamp: float, robots: list[Robot], believed: list[Pose]
+        self, topic: str, stamp: float, robots: list[SimRobot], believed: list[Pose]
     ) -> Message:
         """Return ``tf2_msgs/TFMessage`` of each robot from map to odom to base.
 
@@ -149,7 +149,7 @@ class Messages:
         return {"transforms": found}
 
     def static_transforms(
-        self, topic: str, stamp: float, robots: list[Robot]
+        self, topic: str, stamp: float, robots: list[SimRobot]
     ) -> Message:
         """Return the transforms of the sensors on the base."""
         return {

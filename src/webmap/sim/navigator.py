@@ -8,7 +8,7 @@ from random import Random
 
 from webmap.base.geometry import Pose, Twist, normalize_angle
 from webmap.sim.planner import Planner, Point
-from webmap.sim.robot import Robot
+from webmap.sim.robot import SimRobot
 
 _CORNER = 0.15
 _ARRIVED = 0.12
@@ -36,11 +36,11 @@ class GoalState(Enum):
     ABORTED = "aborted"
 
 
-class Goal:
+class SimGoal:
     """A pose to drive to, in the map's frame, and a callback for its end."""
 
     def __init__(
-        self, pose: Pose, on_end: Callable[["Goal"], None] | None = None
+        self, pose: Pose, on_end: Callable[["SimGoal"], None] | None = None
     ) -> None:
         self.pose = pose
         self.state = GoalState.ACTIVE
@@ -59,10 +59,10 @@ class Goal:
 class Navigator:
     """Drives one robot to one goal at a time."""
 
-    def __init__(self, robot: Robot, planner: Planner) -> None:
+    def __init__(self, robot: SimRobot, planner: Planner) -> None:
         self.robot = robot
         self.planner = planner
-        self.goal: Goal | None = None
+        self.goal: SimGoal | None = None
         self.path: list[Point] = []
         """The path that it follows, in the map's frame; empty without a path."""
         self.path_changes = 0
@@ -77,7 +77,7 @@ class Navigator:
         self._random = Random(robot.name)  # noqa: S311 - reproducible by design
         self._patience = self._random.uniform(*_PATIENCE)
 
-    def send(self, goal: Goal) -> None:
+    def send(self, goal: SimGoal) -> None:
         """Drive to a goal, which replaces the previous one."""
         self.cancel("another goal came")
         self.goal = goal

@@ -10,9 +10,9 @@ from webmap.ros.rosbridge.server.graph import Graph, Respond
 from webmap.ros.rosbridge.server.quirks import Quirks
 from webmap.sim.actions import ActionlibServer, NavigateToPose
 from webmap.sim.feeds import Feeds, depth, sonar
-from webmap.sim.graph_node import NODE, Node
+from webmap.sim.graph_node import NODE, GraphNode
 from webmap.sim.mounts import OVER, mount, overhead
-from webmap.sim.navigator import Goal
+from webmap.sim.navigator import SimGoal
 from webmap.sim.world import World
 
 log = logging.getLogger("webmap.sim")
@@ -32,7 +32,7 @@ _STATUS_EVERY = 8
 _SLOW_EVERY = 40
 
 
-class RobotsNode(Node):
+class RobotsNode(GraphNode):
     """Publishes the topics of robots, and passes commands to them.
 
     Args:
@@ -153,7 +153,7 @@ class RobotsNode(Node):
     def _on_simple_goal(self, index: int, publication: Publication) -> None:
         at = self.target(publication.message, index)
         if at is not None:
-            self.world.send_goal(index, Goal(at))
+            self.world.send_goal(index, SimGoal(at))
 
     def _on_stop(self, index: int, _: dict[str, Any], respond: Respond) -> None:
         if self._quirks.hanging_stop:

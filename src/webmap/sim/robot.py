@@ -49,7 +49,7 @@ class BaseOptions:
     """Growth of the odometry error: metres (and half as many radians) per metre."""
 
 
-class Robot:
+class SimRobot:
     """One simulated robot, moved in steps."""
 
     def __init__(

@@ -45,7 +45,7 @@ class Scanner:
         self.options = options
         self._random = np.random.default_rng(seed)
         bearings = -math.pi + np.arange(float(options.beams)) * self.angle_increment
-        self._rays = Rays(obstacles, bearings, options.range_max)
+        self._rays = ScannerRays(obstacles, bearings, options.range_max)
 
     @property
     def angle_increment(self) -> float:
@@ -82,7 +82,7 @@ class Scanner:
         return ranges.astype(np.float32)
 
 
-class Rays:
+class ScannerRays:
     """The rays of a sensor that many robots have.
 
     Most robots stand still, and several topics have what one sensor sees. So the

@@ -14,11 +14,16 @@ from webmap.base.errors import ConfigError
 from webmap.base.geometry import Pose, Twist
 from webmap.sim.errands import Errands
 from webmap.sim.maps import FloorPlan
-from webmap.sim.navigator import Goal, Navigator
+from webmap.sim.navigator import Navigator, SimGoal
 from webmap.sim.obstacles import Obstacles
 from webmap.sim.planner import Planner
-from webmap.sim.robot import BaseOptions, Robot
-from webmap.sim.scanner import Rays, Scanner, ScannerOptions, cast_rays
+from webmap.sim.robot import BaseOptions, SimRobot
+from webmap.sim.scanner import (
+    Scanner,
+    ScannerOptions,
+    ScannerRays,
+    cast_rays,
+)
 
 WIDTH, HEIGHT = 320, 200
 FIELD = math.radians(80)
@@ -32,14 +37,14 @@ _CEILING, _FLOOR = np.array([214, 219, 226]), np.array([124, 118, 108])
 _WALL, _BODY = np.array([196, 204, 214]), np.array([32, 92, 196])
 
 
-class Camera:
+class SimCamera:
     """A pinhole camera at the front of a robot, looking along its x."""
 
     def __init__(self, obstacles: Obstacles) -> None:
         self._focal = WIDTH / 2 / math.tan(FIELD / 2)
         across = (WIDTH / 2 - 0.5 - np.arange(WIDTH)) / self._focal
         self._bearings = np.arctan(across)
-        self._rays = Rays(obstacles, self._bearings, _FARTHEST)
+        self._rays = ScannerRays(obstacles, self._bearings, _FARTHEST)
         self._rows = np.arange(HEIGHT)[:, np.newaxis] - HEIGHT / 2
 
     def jpeg(
@@ -150,12 +155,12 @@ class World:
         """Seconds since the world began."""
         self.obstacles = Obstacles(plan)
         self.planner = Planner(self.obstacles, options.base.radius)
-        self.camera = Camera(self.obstacles)
+        self.camera = SimCamera(self.obstacles)
         self.scanner = Scanner(self.obstacles, options.scanner, options.seed)
         self._random = Random(options.seed)  # noqa: S311 - reproducible by design
         places = self._spawn(options.robots + _STATIONS * options.errands)
         self.robots = [
-            Robot(
+            SimRobot(
                 "" if options.flat else f"robot_{i}",
                 pose,
                 options.base,
@@ -197,7 +202,7 @@ class World:
             self._idle_since[index] = self.now
         return accepted
 
-    def send_goal(self, index: int, goal: Goal) -> None:
+    def send_goal(self, index: int, goal: SimGoal) -> None:
         """Send a robot to a goal of a client."""
         self.pause_errands(index)
         self.navigators[index].send(goal)
@@ -310,7 +315,7 @@ class World:
             if navigator.goal is not None:
                 self._idle_since[i] = self.now
             elif self.now - self._idle_since[i] > _REST:
-                self.send_goal(i, Goal(self._random_place()))
+                self.send_goal(i, SimGoal(self._random_place()))
 
     def _random_place(self) -> Pose:
         rows, columns = np.nonzero(~self.planner.blocked)

@@ -13,13 +13,13 @@ from websockets.exceptions import ConnectionClosed
 
 from webmap.base.geometry import Pose, Twist
 from webmap.base.tasks import LoopThread
-from webmap.sim.robot import BaseOptions, Robot
+from webmap.sim.robot import BaseOptions, SimRobot
 from webmap.testing.log import ClientMessage, Moved, ReceivedTwist, WitnessLog
 
 OnMessage = Callable[[int, dict[str, Any]], None]
 
 
-class Socket:
+class WitnessSocket:
     """One WebSocket of a client."""
 
     def __init__(self, number: int, connection: ServerConnection) -> None:
@@ -52,7 +52,7 @@ class WitnessBridge:
         """The nodes that rosapi lists as publishers of a topic."""
         self.port = 0
         self._on_message = on_message
-        self._sockets: dict[int, Socket] = {}
+        self._sockets: dict[int, WitnessSocket] = {}
         self._count = 0
         self._server: Server | None = None
         self._unblocked = asyncio.Event()
@@ -95,7 +95,7 @@ class WitnessBridge:
 
     async def _serve(self, connection: ServerConnection) -> None:
         self._count += 1
-        socket = Socket(self._count, connection)
+        socket = WitnessSocket(self._count, connection)
         self._sockets[socket.number] = socket
         try:
             async for frame in connection:
@@ -107,7 +107,7 @@ class WitnessBridge:
         finally:
             del self._sockets[socket.number]
 
-    async def _process(self, socket: Socket, message: dict[str, Any]) -> None:
+    async def _process(self, socket: WitnessSocket, message: dict[str, Any]) -> None:
         topic = str(message.get("topic"))
         match message.get("op"):
             case "subscribe":
@@ -121,7 +121,7 @@ class WitnessBridge:
             case "send_action_goal" if self.goals_block:
                 await self._unblocked.wait()
 
-    async def _serve_call(self, socket: Socket, message: dict[str, Any]) -> None:
+    async def _serve_call(self, socket: WitnessSocket, message: dict[str, Any]) -> None:
         service = str(message.get("service"))
         if not self.answers_services and not service.startswith("/rosapi/"):
             await self._unblocked.wait()
@@ -203,7 +203,7 @@ class WitnessRobot:
             turn_acceleration=100.0,
             timeout=timeout,
         )
-        self._base = Robot("", Pose(), options)
+        self._base = SimRobot("", Pose(), options)
         self._thread = LoopThread("witness-robot")
         self._bridge = self._thread.do(WitnessBridge, self._on_message)
         self._bridge.goals_block = goals_block

@@ -22,7 +22,7 @@ from running_simulators import Running, simulators
 
 from real_browser import watched_tab
 from webmap.base.geometry import Pose
-from webmap.sim.navigator import Goal
+from webmap.sim.navigator import SimGoal
 from webmap_process import page_of
 
 pytestmark = pytest.mark.browser
@@ -450,7 +450,7 @@ def test_a_goal_has_a_path_a_marker_a_trail_and_lines_in_the_log(tab, running):
     target = _reachable(world, robot.pose, 2, 4)
     world.step = note
     try:
-        running.do(lambda: world.send_goal(0, Goal(target)))
+        running.do(lambda: world.send_goal(0, SimGoal(target)))
         until(lambda: len(navigator.path), lambda count: count > 1, "a path")
         near(tab, 'polyline(".path > polyline")', navigator.path, 0.005, "path")
         goal = 'inWorld(".markers .marker.arrow > *", [[0, 0]])'

@@ -30,7 +30,7 @@ from webmap.features.layers.range import RangeMsg
 from webmap.ros.messages import OccupancyGridMsg, PathMsg
 from webmap.ros.offload import values
 from webmap.ros.rosbridge.events import Publish
-from webmap.ros.worker import Request, answer, view_name
+from webmap.ros.worker import WorkRequest, answer, view_name
 
 MESSAGES = {
     OccupancyGridMsg: grid(CORNERS),
@@ -60,7 +60,7 @@ def test_a_message_decoded_by_the_worker_is_the_same(view):
     name = view_name(view)
     assert name is not None
     *_, there = values(
-        *answer(Request(len(text), "/t", view_name(Publish), name), text), view
+        *answer(WorkRequest(len(text), "/t", view_name(Publish), name), text), view
     )
     assert there == here
 

@@ -21,9 +21,9 @@ from webmap.discovery import discover
 from webmap.discovery.fleet_toml import fleet_toml
 from webmap.discovery.layers import find_layers
 from webmap.features.view.layer_switches import all_layers
-from webmap.fleet.given import Candidate
-from webmap.fleet.shown import ShownRobots
-from webmap.fleet.watch import LookingForLayers
+from webmap.fleet.periodic_search import LayerSearch
+from webmap.fleet.robot_options import Candidate
+from webmap.fleet.view_robots import ViewRobots
 
 FILE = Path(__file__).parents[1] / "own_layers.py"
 URL = "ws://hall:9090"
@@ -103,10 +103,10 @@ def test_custom_layers_have_switches_after_the_built_in_layers():
 
 def test_found_layers_are_added_and_a_shared_layer_only_once():
     bridge, console = Bridge(URL), Console()
-    shown = ShownRobots(console)
+    shown = ViewRobots(console)
     for found in discover(TOPICS, "host").robots:
         shown.add(Candidate(bridge, found))
-    asyncio.run(LookingForLayers(bridge, shown).take(TOPICS))
+    asyncio.run(LayerSearch(bridge, shown).take(TOPICS))
     for robot in console.robots:
         kinds = [type(module).__name__ for module in robot.modules]
         assert kinds.count("Temperature") == 2
@@ -119,11 +119,11 @@ def test_found_layers_are_added_and_a_shared_layer_only_once():
 
 def test_a_shared_custom_layer_is_added_on_a_floor_plan():
     bridge, console = Bridge(URL), Console()
-    shown = ShownRobots(console, grid=False)
+    shown = ViewRobots(console, grid=False)
     topics = TOPICS | {"/map": "nav_msgs/OccupancyGrid"}
     for found in discover(topics, "host").robots:
         shown.add(Candidate(bridge, found))
-    asyncio.run(LookingForLayers(bridge, shown).take(topics))
+    asyncio.run(LayerSearch(bridge, shown).take(topics))
     assert console.grids == {}
     assert console._more == [("Zones", (bridge, "/zones"), {})]
     for robot in console.robots:

@@ -8,7 +8,7 @@ from webmap.base.errors import WireError
 from webmap.scene.wire.messages import (
     LONGEST,
     ElementEvent,
-    Hello,
+    PageHello,
     ViewReport,
     read_message,
 )
@@ -32,7 +32,7 @@ def text(message, **changes):
 
 def test_a_hello_message_identifies_the_page():
     hello = read_message(text(HELLO))
-    assert isinstance(hello, Hello)
+    assert isinstance(hello, PageHello)
     assert hello.containers == {"map": (700, 500)}
     assert (hello.page, hello.url, hello.theme) == ("abcdefgh-1", "/lab?x=1", "dark")
 

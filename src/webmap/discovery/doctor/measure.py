@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any, TypeVar
 
-from webmap.agents.present import about_agent
+from webmap.agents.announcements import about_agent
 from webmap.base.errors import BridgeClosed, BridgeError
 from webmap.discovery.doctor.facts import (
     MOST_ROBOTS,

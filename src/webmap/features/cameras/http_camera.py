@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from webmap.agents.far_camera import FarCamera, FarPull
+from webmap.agents.remote_camera import RemoteCamera, RemoteCameraPull
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.lifecycle import lifecycle
 from webmap.core.registry import robot_modules
@@ -50,9 +50,9 @@ class HttpCamera(CameraFeed):
                 f"{throttle!r}"
             )
         far = isinstance(address, str) and is_agent_url(address)
-        self._address = FarCamera.parse(address) if far else parse_address(address)
+        self._address = RemoteCamera.parse(address) if far else parse_address(address)
         self._throttle = throttle
-        self._pull: Pull | FarPull | None = None
+        self._pull: Pull | RemoteCameraPull | None = None
 
     @property
     def address(self) -> str:
@@ -62,8 +62,8 @@ class HttpCamera(CameraFeed):
     def begin(self) -> None:
         """Connect to the camera as soon as the process runs."""
         address, seconds = self._address, self._throttle / 1000
-        if isinstance(address, FarCamera):
-            self._pull = FarPull(address, self._show, self._complain)
+        if isinstance(address, RemoteCamera):
+            self._pull = RemoteCameraPull(address, self._show, self._complain)
         else:
             self._pull = Pull(address, seconds, self._show, self._complain)
         lifecycle.add(self._pull)

@@ -381,7 +381,7 @@ class Pages:
             connection.send_text(gone_text(gone))
 
     def on_refusal(self, refused: protocol.Refused) -> None:
-        """Send a refusal to its page."""
+        """Send a refusal to its page, unless that has closed."""
         connection = self._connections.get(refused.connection)
         if connection is not None:
             connection.send_text(refused_text(refused))

@@ -30,7 +30,7 @@ Taken = concurrent.futures.Future[int]
 
 
 @dataclass
-class Request:
+class PendingRequest:
     """A request to take or release a robot, which the gate has not answered yet."""
 
     robot: str
@@ -62,9 +62,9 @@ class ProgramCommands:
         self._lock = lock
         self._clock = clock
         self._numbers = itertools.count(1)
-        self._takes: dict[int, tuple[Request, Taken]] = {}
+        self._takes: dict[int, tuple[PendingRequest, Taken]] = {}
         """By the number of the request."""
-        self._releases: dict[str, Request] = {}
+        self._releases: dict[str, PendingRequest] = {}
         """By robot."""
         self._epochs: dict[str, int] = {}
         self._passed_on: dict[str, tuple[float, commands.Velocity]] = {}
@@ -113,10 +113,10 @@ class ProgramCommands:
         for taken in ended:
             taken.set_exception(NoLease(f"robot {robot!r}: {why}"))
 
-    def _request(self, robot: str, message: FromProgram) -> Request:
+    def _request(self, robot: str, message: FromProgram) -> PendingRequest:
         now = self._clock()
         self._send(message)
-        return Request(robot, message, now, now)
+        return PendingRequest(robot, message, now, now)
 
     def twist(self, robot_id: str, twist: Twist) -> None:
         """Send one velocity; without another within 200 ms the robot is stopped.

@@ -141,7 +141,7 @@ class GateProcess:
 
     @property
     def pid(self) -> int:
-        """The process id."""
+        """The id of the process, which may have ended."""
         return self._process.pid
 
     @property
@@ -155,7 +155,7 @@ class GateProcess:
         return text or f"exit code {code}, no message"
 
     def start(self) -> None:
-        """Start to read."""
+        """Start the threads that read messages and log lines of the gate."""
         self._listener.start()
         self._reader.start()
 
@@ -249,7 +249,7 @@ class GateListener(Protocol):
 
 
 class GateLink(Protocol):
-    """The way of messages to a gate."""
+    """How a client reaches its gate: by a pipe, or through an agent."""
 
     @property
     def ready(self) -> bool:

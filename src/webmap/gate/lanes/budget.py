@@ -40,9 +40,21 @@ CLOSE = 0.25
 
 
 class Budget:
-    """The use of one link; it outlives the sockets of the link."""
+    """The use of one link; it outlives the sockets of the link.
 
-    def __init__(self) -> None:
+    An agent also has one for each display and user, with other rates.
+
+    Args:
+        frames: Frames per second.
+        size: Bytes per second.
+        burst: The largest use, in seconds, before the link has to wait.
+
+    """
+
+    def __init__(
+        self, frames: float = FRAMES, size: float = BYTES, burst: float = BURST
+    ) -> None:
+        self._frame_rate, self._byte_rate, self._burst = frames, size, burst
         self._used = 0.0
         self._at = 0.0
         self._close_since: float | None = None
@@ -61,8 +73,10 @@ class Budget:
 
         """
         self._pass_time(now)
-        self._used += max(frames / FRAMES, size / BYTES, work / WORK)
-        if self._used <= BURST - CLOSE:
+        self._used += max(
+            frames / self._frame_rate, size / self._byte_rate, work / WORK
+        )
+        if self._used <= self._burst - CLOSE:
             return
         if self._close_since is None:
             self._close_since = now
@@ -82,7 +96,7 @@ class Budget:
     def wait(self, now: float) -> float:
         """Return for how many seconds the link must not be read; 0.0 if it may be."""
         self._pass_time(now)
-        return 0.0 if self._used < BURST else self._used - BURST + PAUSE
+        return 0.0 if self._used < self._burst else self._used - self._burst + PAUSE
 
     def flood(self, now: float) -> str | None:
         """Return why the link must be dropped; None if it need not be."""
@@ -102,5 +116,5 @@ class Budget:
     def _pass_time(self, now: float) -> None:
         self._used = max(0.0, self._used - (now - self._at))
         self._at = now
-        if self._used <= BURST - CLOSE:
+        if self._used <= self._burst - CLOSE:
             self._close_since = None

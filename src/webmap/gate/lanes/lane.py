@@ -39,7 +39,7 @@ MOST_TROUBLES = 20
 """How many different errors are logged before a link is steady again."""
 
 
-class Attempts:
+class ReconnectWaits:
     """Decides how long to wait before each attempt, and which errors are logged."""
 
     def __init__(self) -> None:
@@ -141,7 +141,7 @@ class Lane:
 
     @property
     def wanted(self) -> bool:
-        """Whether the lane is held."""
+        """Whether anything is announced, so that the socket has to be open."""
         return bool(self._holds)
 
     def hold(self, id: str, hello: bytes = b"", goodbye: bytes = b"") -> None:
@@ -186,17 +186,17 @@ class Lane:
         elif link is not None:
             link.abort(why)
 
-    def spend(self, ears: SocketHandlers) -> Socket:
+    def spend(self, handlers: SocketHandlers) -> Socket:
         """Hand the open socket over to other handlers and connect again."""
         link = self._socket
         assert link is not None  # it has just been written to
-        link.ears = ears
+        link.handlers = handlers
         self._trouble = None
         self._drop()
         return link
 
     def close(self) -> None:
-        """Close the lane permanently."""
+        """Close the socket, and open none again."""
         self._task.cancel()
         link, self._socket = self._socket, None
         if link is not None:
@@ -224,11 +224,11 @@ class Lane:
             self._pong(number)
 
     async def _run(self) -> None:
-        attempts, loop = Attempts(), asyncio.get_running_loop()
+        attempts, loop = ReconnectWaits(), asyncio.get_running_loop()
         while True:
             try:
-                ears = SocketHandlers(self._text, self._on_pong, self._lost)
-                link = await open_socket(self.url, ears, self._budget)
+                handlers = SocketHandlers(self._text, self._on_pong, self._lost)
+                link = await open_socket(self.url, handlers, self._budget)
             except BridgeClosed as error:
                 if attempts.is_new(str(error)):
                     log.warning("no connection: %s", error)

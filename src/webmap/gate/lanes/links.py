@@ -15,7 +15,13 @@ from webmap.gate.events import (
 )
 from webmap.gate.lanes.control import ControlLane
 from webmap.gate.lanes.odometry import OdometryLane
-from webmap.gate.lanes.tasks import Calls, TasksLane, Topic, goal_topics, hook_topics
+from webmap.gate.lanes.tasks import (
+    ServiceCalls,
+    TasksLane,
+    Topic,
+    goal_topics,
+    hook_topics,
+)
 from webmap.gate.protocol import RobotSpec
 from webmap.gate.rules.health import STALL_LIMIT
 from webmap.gate.rules.motion import ZERO
@@ -36,7 +42,7 @@ class Links:
         self._control: dict[str, ControlLane] = {}
         self._odometry: dict[str, OdometryLane] = {}
         self._tasks: dict[str, TasksLane] = {}
-        self._calls: dict[str, Calls] = {}
+        self._calls: dict[str, ServiceCalls] = {}
         """By bridge; a call goes on after the lane that made it has closed."""
         self._robots: dict[Key, dict[str, RobotSpec]] = {}
         self._watched: dict[Key, list[RobotSpec]] = {}
@@ -138,7 +144,7 @@ class Links:
         for url, topics in _tasks_of(spec).items():
             tasks = self._tasks.get(url)
             if tasks is None:
-                calls = self._calls.setdefault(url, Calls(url))
+                calls = self._calls.setdefault(url, ServiceCalls(url))
                 tasks = self._tasks[url] = TasksLane(url, self._emit, calls)
             tasks.lane.hold("robots")
             tasks.attach(topics)

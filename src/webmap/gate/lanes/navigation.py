@@ -97,7 +97,7 @@ class _Result(msgspec.Struct):
     error_msg: str = ""
 
 
-class _Frame(msgspec.Struct):
+class _GoalFrame(msgspec.Struct):
     op: str = ""
     id: str | int | None = None
     topic: str = ""
@@ -225,13 +225,13 @@ def readable(text: str) -> str:
     return "".join(letter for letter in plain if letter.isprintable())[:MOST_WORDS]
 
 
-def _read(data: bytes) -> _Frame | None:
+def _read(data: bytes) -> _GoalFrame | None:
     try:
         # Bridges write a bare NaN, which msgspec refuses.
         value = plain(data)
     except ValueError:
         return None
-    return _as(value, _Frame)
+    return _as(value, _GoalFrame)
 
 
 def _as(value: Any, type: type[T]) -> T | None:
@@ -241,14 +241,14 @@ def _as(value: Any, type: type[T]) -> T | None:
         return None
 
 
-class Answer(NamedTuple):
+class CallResult(NamedTuple):
     """The outcome of a service call."""
 
     why: str | None
     """Why the call failed; ``None`` if it did not."""
 
 
-class _Answer(msgspec.Struct):
+class _ServiceFrame(msgspec.Struct):
     op: str = ""
     id: str | int | None = None
     result: Any = None
@@ -257,7 +257,7 @@ class _Answer(msgspec.Struct):
     msg: Any = None
 
 
-def answer_to(data: bytes, id: str) -> Answer | None:
+def answer_to(data: bytes, id: str) -> CallResult | None:
     """Return the answer to the call ``id`` in a message; ``None`` if it has none.
 
     A call has failed only if the answer states so: old bridges leave out ``result``,
@@ -268,21 +268,23 @@ def answer_to(data: bytes, id: str) -> Answer | None:
 
     """
     try:
-        frame = msgspec.convert(plain(data), _Answer)
+        frame = msgspec.convert(plain(data), _ServiceFrame)
     except ValueError:  # msgspec's own errors are of that kind too
         return None
     if str(frame.id) != id:
         return None
     if frame.op == "status" and frame.level == "error":
-        return Answer(_because("refused", frame.msg))
+        return CallResult(_because("refused", frame.msg))
     if frame.op != "service_response":
         return None
     if frame.result is False:
-        return Answer(_because("refused", frame.values))
+        return CallResult(_because("refused", frame.values))
     values = frame.values
     if isinstance(values, dict) and values.get("success") is False:
-        return Answer(_because("the service reported a failure", values.get("message")))
-    return Answer(None)
+        return CallResult(
+            _because("the service reported a failure", values.get("message"))
+        )
+    return CallResult(None)
 
 
 def _because(what: str, text: Any) -> str:

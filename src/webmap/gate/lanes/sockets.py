@@ -67,14 +67,14 @@ class Socket(asyncio.Protocol):
 
     Args:
         url: The bridge's address.
-        ears: The callbacks.
+        handlers: The callbacks.
         budget: How much the bridge may send.
 
     """
 
-    def __init__(self, url: str, ears: SocketHandlers, budget: Budget) -> None:
+    def __init__(self, url: str, handlers: SocketHandlers, budget: Budget) -> None:
         self.url = url
-        self.ears = ears
+        self.handlers = handlers
         self.flooded = False
         """Whether it was dropped for what the bridge sent: too much or invalid data."""
         self._budget = budget
@@ -228,8 +228,8 @@ class Socket(asyncio.Protocol):
         """Return how many of the waiting bytes to process next."""
         if self._over or self._choked:
             return 0
-        shaken = self._protocol.state is not State.CONNECTING
-        return self._pieces.next(self._waiting, shaken=shaken)
+        handshake_done = self._protocol.state is not State.CONNECTING
+        return self._pieces.next(self._waiting, handshake_done=handshake_done)
 
     def _read_on(self, on: bool) -> None:
         """Resume or pause reading from the connection."""
@@ -270,7 +270,7 @@ class Socket(asyncio.Protocol):
 
     def _on_frame(self, frame: Frame) -> None:
         if frame.opcode is Opcode.PONG:
-            self.ears.pong(bytes(frame.data))
+            self.handlers.pong(bytes(frame.data))
         elif frame.opcode in (Opcode.TEXT, Opcode.BINARY, Opcode.CONT):
             self._parts.append(bytes(frame.data))
             if len(self._parts) > MAX_PARTS:
@@ -281,7 +281,7 @@ class Socket(asyncio.Protocol):
 
     def _pass_on(self, text: bytes) -> None:
         try:
-            self.ears.text(text)
+            self.handlers.text(text)
         except ProtocolError as error:
             if not self._complained:
                 self._complained = True
@@ -305,15 +305,15 @@ class Socket(asyncio.Protocol):
         if not self.opened.done():
             self.opened.set_exception(BridgeClosed(f"{self.url}: {why}"))
         elif not self.opened.cancelled():  # cancelled: given up before it was open
-            self.ears.lost(why)
+            self.handlers.lost(why)
 
 
-async def open_socket(url: str, ears: SocketHandlers, budget: Budget) -> Socket:
+async def open_socket(url: str, handlers: SocketHandlers, budget: Budget) -> Socket:
     """Connect to a bridge.
 
     Args:
         url: Its address.
-        ears: The callbacks.
+        handlers: The callbacks.
         budget: How much the bridge may send, with the use by earlier sockets.
 
     Raises:
@@ -321,7 +321,7 @@ async def open_socket(url: str, ears: SocketHandlers, budget: Budget) -> Socket:
 
     """
     uri = parse_uri(url)
-    made = Socket(url, ears, budget)
+    made = Socket(url, handlers, budget)
     try:
         async with asyncio.timeout(CONNECT_TIMEOUT):
             # Loading the certificates takes 0.1 s, and other robots cannot wait.

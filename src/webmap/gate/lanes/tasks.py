@@ -3,8 +3,8 @@
 Some bridges do nothing else for a socket until the action goal that it sent has ended.
 So an action goal uses up a socket: the lane keeps it for the result and opens another
 for the next messages. For the same reason, and because the handle of an action goal
-belongs to the socket that sent it, :class:`Calls` calls the cancel service on a socket
-of its own.
+belongs to the socket that sent it, :class:`ServiceCalls` calls the cancel service on a
+socket of its own.
 
 move_base is an action made of topics, which block nothing: its messages come on the
 lane itself, its status only while a goal of the gate is followed.
@@ -60,7 +60,7 @@ Ended = Callable[[str | None], None]
 """Called with the reason of a failure, or with ``None`` after a success."""
 
 
-class Calls:
+class ServiceCalls:
     """Calls services of one bridge and keeps track of the calls.
 
     Args:
@@ -119,10 +119,10 @@ class Calls:
             reason = readable(f"no answer: connection lost: {why}")
             outcomes.put_nowait(reason)
 
-        ears = SocketHandlers(text=on_text, pong=lambda _: None, lost=lost)
+        handlers = SocketHandlers(text=on_text, pong=lambda _: None, lost=lost)
         try:
             async with asyncio.timeout(CALL_TIMEOUT):
-                link = await open_socket(self._url, ears, self._budget)
+                link = await open_socket(self._url, handlers, self._budget)
                 try:
                     link.send(request)
                     return await outcomes.get()
@@ -164,7 +164,9 @@ class TasksLane:
 
     """
 
-    def __init__(self, url: str, emit: Callable[[Event], None], calls: Calls) -> None:
+    def __init__(
+        self, url: str, emit: Callable[[Event], None], calls: ServiceCalls
+    ) -> None:
         self._url = url
         self._emit = emit
         self._calls = calls
@@ -342,7 +344,7 @@ def hook_topics(spec: RobotSpec) -> list[Topic]:
 
 
 def goal_topics(spec: RobotSpec) -> list[Topic]:
-    """Return the topics of a robot's goals."""
+    """Return the topics of a robot's goals, cancels and poses, with their types."""
     topics = []
     if spec.goal_topic is not None:
         topics.append((spec.goal_topic, spec.goal_type))

@@ -209,7 +209,7 @@ class Aliases:
             earlier.spec, earlier.link = spec, hooks
 
     def drop(self, robot: str) -> None:
-        """Remove a robot."""
+        """Remove a robot that is declared, and end its lanes."""
         self.leaving.discard(robot)
         del self.specs[robot], self.goals[robot], self.hooks[robot]
         self._emit(Detach(self._key, robot))

@@ -25,7 +25,7 @@ from webmap.gate.rules.health import (
     Video,
 )
 from webmap.gate.rules.motion import DeadMan, Motion
-from webmap.gate.rules.speeds import Speeds
+from webmap.gate.rules.speeds import MachineSpeeds
 from webmap.gate.rules.stop import StopLatch
 
 
@@ -162,7 +162,7 @@ class Handover:
         return who
 
     def withdraw(self, connection: str) -> None:
-        """Withdraw the request of this connection."""
+        """End the request of a connection, or the handover to it, if it has one."""
         for who in (self.asker, self.successor):
             if who is not None and who.id == connection:
                 self.end()
@@ -195,7 +195,7 @@ class Authority:
         robots: Aliases,
         conditions: MotionConditions,
         motion: Motion,
-        speeds: Speeds,
+        speeds: MachineSpeeds,
         epochs: Epochs,
         halt: Callable[[str, float], None],
         changed: Callable[[float], None],

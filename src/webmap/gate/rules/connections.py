@@ -228,7 +228,7 @@ class Connection:
         self.cap = page_cap(v, w)
 
     def note_refused(self, what: str, why: str) -> None:
-        """Count a refused message."""
+        """Count a refused message, for :meth:`count_refused`."""
         self._refused += 1
         self._last_refused = f"{what}: {why}"
 

@@ -6,7 +6,7 @@ from webmap.gate.rules.aliases import Aliases
 from webmap.gate.rules.authority import Authority, MotionConditions
 from webmap.gate.rules.connections import Lease
 from webmap.gate.rules.motion import Motion
-from webmap.gate.rules.stop_test import CREEP, StopTest, StopTests
+from webmap.gate.rules.stop_test import CREEP, MachineTest, StopTests
 
 
 class Driving:
@@ -98,7 +98,7 @@ class Driving:
         self._tests.begin(self._authority.deadman.armed, now)
 
     def _go_on_with_test(
-        self, test: StopTest, lease: Lease, neutral: bool, now: float
+        self, test: MachineTest, lease: Lease, neutral: bool, now: float
     ) -> str | None:
         if not neutral:
             self._disarm_and_halt("an input was used", now)

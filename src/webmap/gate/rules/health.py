@@ -20,7 +20,7 @@ class Ages:
         self._sorted: list[float] = []
 
     def add(self, age: float, now: float) -> None:
-        """Add an age in seconds."""
+        """Add an age in seconds, and drop those from before the window."""
         self._ages.append((now, age))
         insort(self._sorted, age)
         self.forget_old(now)

@@ -31,7 +31,7 @@ from webmap.gate.rules.driving import Driving
 from webmap.gate.rules.health import DisplayPulse, LinkHealth, Observation
 from webmap.gate.rules.motion import Motion
 from webmap.gate.rules.obedience import EXPECTED_FOR, Obedience, OtherWriter
-from webmap.gate.rules.speeds import Speeds
+from webmap.gate.rules.speeds import MachineSpeeds
 from webmap.gate.rules.stop import ActiveStop, StopLatch
 from webmap.gate.rules.stop_test import StopTests
 
@@ -74,7 +74,7 @@ class Machine:
         """The robots that are declared for this machine."""
         self.known = False
         """Whether the shell has reported the lock, and whether STOP is active."""
-        self.speeds = Speeds(self.robots, control)
+        self.speeds = MachineSpeeds(self.robots, control)
         self.scan_assist = ScanAssist(self.robots)
         self.motion = Motion(
             key, control, self.speeds.bounds, self.scan_assist.limit, emit

@@ -172,7 +172,7 @@ ZERO = Twist()
 
 
 @dataclass(frozen=True, slots=True)
-class Bounds:
+class MotionLimits:
     """The limits of a machine's motion at this moment."""
 
     speed: Speed
@@ -197,7 +197,7 @@ class Motion:
         self,
         key: Key,
         control: LinkHealth,
-        bounds: Callable[[], Bounds],
+        bounds: Callable[[], MotionLimits],
         guard: Callable[[Twist, float], Twist],
         emit: Emit,
     ) -> None:

@@ -20,7 +20,7 @@ from webmap.gate.limits import (
 )
 from webmap.gate.rules.aliases import Aliases
 from webmap.gate.rules.health import Ages, LinkHealth
-from webmap.gate.rules.motion import DEADMAN, Bounds
+from webmap.gate.rules.motion import DEADMAN, MotionLimits
 
 SLOW = 0.15
 """The age in seconds above which a loop is slow: the speed limit is lower, and the page
@@ -106,7 +106,7 @@ def governed(speed: Speed, slow: float | None, stop_time: float | None) -> Speed
     return Speed(min(v, speed.v), speed.w, (*speed.why, why))
 
 
-class Speeds:
+class MachineSpeeds:
     """The speeds in force for one machine.
 
     Args:
@@ -146,7 +146,7 @@ class Speeds:
             return self.tested.seconds
         return self._robots.stops_within
 
-    def bounds(self) -> Bounds:
+    def bounds(self) -> MotionLimits:
         """Return the limits that apply now."""
         robots = self._robots
-        return Bounds(self.speed, robots.a_max, robots.holonomic, robots.axes)
+        return MotionLimits(self.speed, robots.a_max, robots.holonomic, robots.axes)

@@ -140,7 +140,7 @@ class StopLatch:
             raise Refusal(newer_stop(self.press))
 
     def reset(self) -> None:
-        """Deactivate STOP."""
+        """End the STOP, also on disk."""
         self.press = self.shown = None
         self._save()
         self._ids.clear()
@@ -360,7 +360,7 @@ class ActiveStop:
                 hooks.link_up()
 
     def confirm(self, now: float) -> None:
-        """Update the confirmation."""
+        """Judge whether the machine stands, by the odometry up to ``now``."""
         drivable = self._robots.drivable
         since = self.confirmation.since
         delivered = not drivable or self._control.answered_since(since)

@@ -51,7 +51,7 @@ MOVES_ON = f"the base did not stop within {WAIT_FOR:g} s"
 State = Literal["creeping", "waiting", "done", "failed"]
 
 
-class StopTest:
+class MachineTest:
     """One stop test of one machine.
 
     Args:
@@ -154,7 +154,7 @@ class StopTests:
     def __init__(
         self, key: Key, motion: Motion, sight: Observation, trips: Ages, emit: Emit
     ) -> None:
-        self.last: StopTest | None = None
+        self.last: MachineTest | None = None
         """The newest test, which may be running."""
         self._key = key
         self._motion = motion
@@ -163,7 +163,7 @@ class StopTests:
         self._emit = emit
 
     @property
-    def running(self) -> StopTest | None:
+    def running(self) -> MachineTest | None:
         """The running test."""
         return self.last if self.last is not None and self.last.running else None
 
@@ -185,7 +185,7 @@ class StopTests:
             raise Refusal("no odometry: the stop test needs odometry")
         if moves(measured):
             raise Refusal("the robot is already moving")
-        self.last = StopTest(now)
+        self.last = MachineTest(now)
 
     def on_written(self, twist: Twist) -> None:
         """Note a velocity that the gate wrote."""
@@ -218,7 +218,7 @@ class StopTests:
             if not test.running:
                 self._apply_state(test, now)
 
-    def _apply_state(self, test: StopTest, now: float) -> None:
+    def _apply_state(self, test: MachineTest, now: float) -> None:
         """Do what the new state of ``test`` requires."""
         if test.state == "waiting":
             self._motion.send_nothing()

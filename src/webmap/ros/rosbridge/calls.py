@@ -13,7 +13,7 @@ from typing import Any
 from webmap.base.errors import BridgeClosed, ServiceError
 from webmap.base.identifiers import generate_id
 from webmap.ros.rosbridge import ops
-from webmap.ros.rosbridge.connection import Lane
+from webmap.ros.rosbridge.connection import BridgeConnection
 from webmap.ros.rosbridge.events import Malformed, ServiceResponse, Status
 from webmap.ros.rosbridge.protocol import Protocol
 
@@ -21,7 +21,9 @@ from webmap.ros.rosbridge.protocol import Protocol
 class Calls:
     """The calls to one bridge; the first call opens the socket."""
 
-    def __init__(self, url: str, lane_type: type[Lane] = Lane) -> None:
+    def __init__(
+        self, url: str, lane_type: type[BridgeConnection] = BridgeConnection
+    ) -> None:
         self.url = url
         self._lane_type = lane_type
         self._lane: _CallsLane | None = None
@@ -76,7 +78,7 @@ class Calls:
 
 
 class _CallsLane:
-    def __init__(self, url: str, lane_type: type[Lane]) -> None:
+    def __init__(self, url: str, lane_type: type[BridgeConnection]) -> None:
         self._protocol = Protocol()
         self._waiting: dict[str, asyncio.Future[ServiceResponse]] = {}
         self._ready: asyncio.Future[None] = asyncio.Future()

@@ -29,7 +29,7 @@ LOOK_PERIOD = 0.25
 CLOSED_HERE = "WebMap closed the connection"
 
 
-class Lane:
+class BridgeConnection:
     """A connection that sends and receives frames without reading them.
 
     Frames that cannot be sent now are refused, and unsent frames are dropped when the

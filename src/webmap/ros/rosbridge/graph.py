@@ -30,7 +30,7 @@ def is_client_node(name: str) -> bool:
     return any(part in name for part in CLIENTS)
 
 
-class Graph:
+class BridgeGraph:
     """Questions to the rosapi of a bridge; answers are kept for one connection.
 
     ``get_param_names`` and ``message_details`` are never called: on ROS 2 the first
@@ -204,7 +204,7 @@ class Graph:
         name = str(split_type(type))
         answer = await self._call(QUESTIONS[kind], {"type": name})
         try:
-            parts = convert(answer, _Answer).typedefs
+            parts = convert(answer, _RosapiAnswer).typedefs
             if not parts or len(parts) > MAX_PARTS:
                 raise ProtocolError(f"got {len(parts)} definitions")
             texts = {part.type: _text(part) for part in parts}
@@ -244,7 +244,7 @@ class _Part(msgspec.Struct):
     constvalues: list[str] = []
 
 
-class _Answer(msgspec.Struct):
+class _RosapiAnswer(msgspec.Struct):
     typedefs: list[_Part]
 
 

@@ -58,7 +58,7 @@ class Incoming:
         """Called with each message, text or binary."""
         self.came_long = 0
         """Bytes of the newest message that was longer than a step."""
-        self.shaken = False
+        self.handshake_done = False
         """Whether the handshake has ended. Before that, each line is a step."""
         self._other = other
         self._data: bytes | bytearray = b""
@@ -103,7 +103,7 @@ class Incoming:
         """
         data, at = self._data, self._at
         left = len(data) - at
-        if self._rest or self._dropping or self._passing or not self.shaken:
+        if self._rest or self._dropping or self._passing or not self.handshake_done:
             return left > 0 and self._go_on(left)
         if left < 2:
             if not left:
@@ -162,7 +162,7 @@ class Incoming:
     def _go_on(self, left: int) -> bool:
         """Read a part of what is longer than one step."""
         at = self._at
-        if not self.shaken:
+        if not self.handshake_done:
             self._at = self._data.find(b"\n", at) + 1 or len(self._data)
             self._other(bytes(self._data[at : self._at]))
         elif self._passing:

@@ -17,9 +17,9 @@ from webmap.ros.names import split_type
 from webmap.ros.received import BridgeStats, ReceivedMessage
 from webmap.ros.rosbridge import ops
 from webmap.ros.rosbridge.calls import Calls
-from webmap.ros.rosbridge.connection import CLOSED_HERE, Lane
+from webmap.ros.rosbridge.connection import CLOSED_HERE, BridgeConnection
 from webmap.ros.rosbridge.events import CallService, Event, Malformed, Publish, Status
-from webmap.ros.rosbridge.graph import Graph
+from webmap.ros.rosbridge.graph import BridgeGraph
 from webmap.ros.rosbridge.protocol import Protocol
 from webmap.ros.rosbridge.wire_subscription import (
     IN_CBOR,
@@ -54,7 +54,7 @@ class RosbridgeLink:
 
     """
 
-    lane_type: type[Lane] = Lane
+    lane_type: type[BridgeConnection] = BridgeConnection
     """The kind of its connections."""
 
     def __init__(
@@ -72,7 +72,7 @@ class RosbridgeLink:
         """Why the connection is not open: the last failed attempt or the last loss."""
         self.over: str | None = None
         """Why no connection is opened any more; None if connections are allowed."""
-        self.graph = Graph(self.call_service)
+        self.graph = BridgeGraph(self.call_service)
         self._url = url
         self._name = name
         self._on_open = opened

@@ -119,7 +119,7 @@ class PacedConnection(ClientConnection):
         if self._finished:
             return None
         incoming = self._incoming
-        while self._delivers or not incoming.shaken:
+        while self._delivers or not incoming.handshake_done:
             if self.paused and not self._lost:
                 break
             try:
@@ -145,7 +145,7 @@ class PacedConnection(ClientConnection):
         """Let ``websockets`` process bytes, and note what they change."""
         super().data_received(data)
         state = self.protocol.state
-        self._incoming.shaken = state is not State.CONNECTING
+        self._incoming.handshake_done = state is not State.CONNECTING
         if state in (State.CLOSING, State.CLOSED):
             self._incoming.message = ignore
 

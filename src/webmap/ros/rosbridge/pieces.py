@@ -18,15 +18,16 @@ class Pieces:
         self._rest = 0
         """Missing bytes of the current frame."""
 
-    def next(self, waiting: bytearray, *, shaken: bool) -> int:
+    def next(self, waiting: bytearray, *, handshake_done: bool) -> int:
         """Return the length of the next piece; 0 if it is incomplete.
 
         Args:
             waiting: The bytes that wait; the piece is at their beginning.
-            shaken: Whether the handshake has ended. Before that, each line is a piece.
+            handshake_done: Whether the handshake has ended. Before that, each line is a
+                piece.
 
         """
-        if not shaken:
+        if not handshake_done:
             return waiting.find(b"\n") + 1 or len(waiting)
         if self._rest == 0:
             self._rest = _size_of_frame(waiting)

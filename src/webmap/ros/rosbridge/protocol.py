@@ -70,7 +70,7 @@ def _pixels(packed: bytes, max_bytes: int) -> bytes:
         raise ProtocolError(f"not a PNG: {error!r}") from None
 
 
-class Fragment(msgspec.Struct, frozen=True):
+class TextFragment(msgspec.Struct, frozen=True):
     """One piece of a longer text."""
 
     id: str | int | float | None
@@ -95,7 +95,7 @@ class _Assembly:
         self.received = 0
         self.messages = 1
 
-    def add(self, fragment: Fragment) -> None:
+    def add(self, fragment: TextFragment) -> None:
         try:
             data = fragment.data.encode()
         except UnicodeEncodeError as error:
@@ -151,7 +151,7 @@ class Fragments:
     def __len__(self) -> int:
         return len(self._open)
 
-    def add(self, fragment: Fragment, now: float) -> bytes | None:
+    def add(self, fragment: TextFragment, now: float) -> bytes | None:
         """Add one fragment; return the whole text if this was the last.
 
         Raises:
@@ -178,7 +178,7 @@ class Fragments:
             )
         return assembly.text()
 
-    def _check(self, fragment: Fragment) -> None:
+    def _check(self, fragment: TextFragment) -> None:
         if not math.isfinite(fragment.total) or fragment.count < 1:
             raise ProtocolError(f"a fragment of {fragment.total!r} fragments")
         if fragment.count > self.max_count:
@@ -308,7 +308,7 @@ class Protocol:
             return self._read_inner(inner, now)
         if nested:
             raise ProtocolError("a fragment within another wrapping")
-        text = self._fragments.add(decode_json(frame, Fragment), now)
+        text = self._fragments.add(decode_json(frame, TextFragment), now)
         if text is None:
             return None
         event = self._read(text, now, nested=True)

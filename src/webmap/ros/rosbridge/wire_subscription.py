@@ -274,7 +274,7 @@ PERIOD = 1.0
 """Seconds between two rounds."""
 
 
-class Silence:
+class TopicSilence:
     """When to check one topic without messages, and when to subscribe again. No I/O.
 
     Args:
@@ -369,17 +369,19 @@ class Renewals:
             await asyncio.gather(task, return_exceptions=True)
 
     async def _check_regularly(self) -> None:
-        silent: dict[WireSubscription, Silence] = {}
+        silent: dict[WireSubscription, TopicSilence] = {}
         while True:
             await asyncio.sleep(PERIOD)
             now = time.monotonic()
             without = [each for each in self._subscriptions() if not each.topic.count]
-            silent = {each: silent.get(each) or Silence(now) for each in without}
+            silent = {each: silent.get(each) or TopicSilence(now) for each in without}
             for subscription, silence in silent.items():
                 if silence.due(now):
                     await self._check(subscription, silence)
 
-    async def _check(self, subscription: WireSubscription, silence: Silence) -> None:
+    async def _check(
+        self, subscription: WireSubscription, silence: TopicSilence
+    ) -> None:
         topic, published = subscription.topic, None
         if self._unanswered < UNANSWERED:
             published = await self._published(topic.name)

@@ -26,7 +26,7 @@ _Id = Annotated[int, Meta(ge=0, le=2**53)]
 _Name = Annotated[str, Meta(max_length=LONGEST_TEXTS["name"])]
 
 
-class Message(
+class PageMessage(
     msgspec.Struct,
     frozen=True,
     kw_only=True,
@@ -36,7 +36,7 @@ class Message(
     """Base class of the messages of a page."""
 
 
-class Hello(Message, frozen=True, tag="hello"):
+class PageHello(PageMessage, frozen=True, tag="hello"):
     """The page's identity and size, in the address of its socket or its first message.
 
     In the address, so that the first picture takes one round trip less.
@@ -67,7 +67,7 @@ class Hello(Message, frozen=True, tag="hello"):
     """The width and height of each element with an id in the page, in pixels."""
 
 
-class ElementEvent(Message, frozen=True, tag="event"):
+class ElementEvent(PageMessage, frozen=True, tag="event"):
     """An event of an element with a listener."""
 
     mount: _Id
@@ -88,7 +88,7 @@ class ElementEvent(Message, frozen=True, tag="event"):
     checked: bool | None = None
 
 
-class ViewReport(Message, frozen=True, tag="view"):
+class ViewReport(PageMessage, frozen=True, tag="view"):
     """The current view of a map: the matrix from the world to pixels, and its size."""
 
     map_element: _Id
@@ -116,42 +116,44 @@ class ViewReport(Message, frozen=True, tag="view"):
     """The number of the newest operation that the view contains."""
 
 
-class ModuleReady(Message, frozen=True, tag="ready"):
+class ModuleReady(PageMessage, frozen=True, tag="ready"):
     """A module's browser part was attached, possibly again after a reload."""
 
     instance: _Id
 
 
-class ModuleMessage(Message, frozen=True, tag="module"):
+class ModuleMessage(PageMessage, frozen=True, tag="module"):
     """A message of a module's browser part to the module."""
 
     instance: _Id
     data: dict[str, Any]
 
 
-class Trouble(Message, frozen=True, tag="trouble"):
+class Trouble(PageMessage, frozen=True, tag="trouble"):
     """A failure of the page that is logged."""
 
     text: Annotated[str, Meta(max_length=LONGEST_TEXTS["trouble"])]
 
 
-class Seen(Message, frozen=True, tag="seen"):
+class Seen(PageMessage, frozen=True, tag="seen"):
     """The page has applied this frame and all before it."""
 
     frame: _Id
 
 
-class Unseen(Message, frozen=True, tag="unseen"):
+class Unseen(PageMessage, frozen=True, tag="unseen"):
     """The elements that are drawn as dots and not shown: their layers are off."""
 
     elements: Annotated[list[_Id], Meta(max_length=MOST_UNSEEN)]
 
 
-class Resync(Message, frozen=True, tag="resync"):
+class Resync(PageMessage, frozen=True, tag="resync"):
     """The page could not read a frame and requests the whole state."""
 
 
-PageEvent = Hello | ElementEvent | ViewReport | ModuleReady | ModuleMessage | Trouble
+PageEvent = (
+    PageHello | ElementEvent | ViewReport | ModuleReady | ModuleMessage | Trouble
+)
 """Messages that concern more than the session itself."""
 
 _decoder: msgspec.json.Decoder[PageEvent | Seen | Unseen | Resync] = (

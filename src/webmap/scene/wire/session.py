@@ -18,10 +18,10 @@ from webmap.scene.wire.dots import PageDots
 from webmap.scene.wire.encode import delta, encode_changes
 from webmap.scene.wire.messages import (
     ElementEvent,
-    Hello,
     ModuleMessage,
     ModuleReady,
     PageEvent,
+    PageHello,
     Resync,
     Seen,
     Unseen,
@@ -307,7 +307,7 @@ class SceneSession:
         """
         message = read_message(text)
         match message:
-            case Hello(gzip=reads_gzip):
+            case PageHello(gzip=reads_gzip):
                 self._reads_gzip = reads_gzip
             case Seen(frame=frame):
                 if self._seen < frame <= self._frame:

@@ -11,10 +11,10 @@ from webmap.sim.feeds.feed import Feed
 from webmap.sim.feeds.health import Health
 from webmap.sim.feeds.localization import Localizations, Satellites
 from webmap.sim.feeds.logs import Logs
-from webmap.sim.feeds.marks import Marks
+from webmap.sim.feeds.marks import MarkerFeed
 from webmap.sim.feeds.navigation import CostmapTopics, Footprints, Lookaheads
 from webmap.sim.feeds.sonar import Sonars
-from webmap.sim.graph_node import Node
+from webmap.sim.graph_node import GraphNode
 
 
 class Feeds:
@@ -26,7 +26,7 @@ class Feeds:
 
     """
 
-    def __init__(self, node: Node, step: float) -> None:
+    def __init__(self, node: GraphNode, step: float) -> None:
         self._node = node
         self._step = step
         self.localizations = Localizations(node)
@@ -40,7 +40,7 @@ class Feeds:
             Lookaheads(node).feed,
             Sonars(node).feed,
             Satellites(node).feed,
-            Marks(node).feed,
+            MarkerFeed(node).feed,
             *([DepthClouds(node).feed] if node.tilted else ()),
         )
 

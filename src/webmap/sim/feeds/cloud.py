@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from webmap.sim.feeds.feed import Feed
-from webmap.sim.graph_node import Node
+from webmap.sim.graph_node import GraphNode
 from webmap.sim.messages import Message
 from webmap.sim.mounts import LASER_HEIGHT
 
@@ -31,7 +31,7 @@ _DATATYPES = {"<f4": 7, "<u2": 4}
 class Clouds:
     """Makes ``sensor_msgs/PointCloud2``, in the frame of the scanner."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: GraphNode) -> None:
         self._node = node
         self.feed = Feed("points", "sensor_msgs/PointCloud2", 0.2, self._make)
 

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 from webmap.base.geometry import Pose
 from webmap.sim.feeds.cloud import cloud_message
 from webmap.sim.feeds.feed import Feed
-from webmap.sim.graph_node import Node
+from webmap.sim.graph_node import GraphNode
 from webmap.sim.messages import Message
 from webmap.sim.mounts import OPTICAL, mount, seen_from
-from webmap.sim.scanner import Rays, shade
+from webmap.sim.scanner import ScannerRays, shade
 
 FRAME = "camera_optical"
 AHEAD, HEIGHT = 0.2, 0.4
@@ -41,9 +41,9 @@ POINT = np.dtype([("x", "<f4"), ("y", "<f4"), ("z", "<f4")])
 class DepthClouds:
     """Makes ``sensor_msgs/PointCloud2`` as a camera's driver does."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: GraphNode) -> None:
         self._node = node
-        self._rays = Rays(node.world.obstacles, BEARINGS, FARTHEST)
+        self._rays = ScannerRays(node.world.obstacles, BEARINGS, FARTHEST)
         self.feed = Feed("camera/points", "sensor_msgs/PointCloud2", 0.2, self._make)
 
     def _make(self, index: int, topic: str, stamp: float) -> Message:

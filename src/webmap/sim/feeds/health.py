@@ -1,8 +1,8 @@
 """Diagnostics of the parts of all robots, on one topic."""
 
-from webmap.sim.graph_node import Node
+from webmap.sim.graph_node import GraphNode
 from webmap.sim.messages import Message
-from webmap.sim.robot import Robot
+from webmap.sim.robot import SimRobot
 
 TOPIC = "/diagnostics"
 OK, WARN, ERROR = 0, 1, 2
@@ -13,7 +13,7 @@ LOW, EMPTY = 0.3, 0.1
 class Health:
     """Publishes ``diagnostic_msgs/DiagnosticArray``, a message for each robot."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: GraphNode) -> None:
         self._node = node
 
     def start(self) -> None:
@@ -32,7 +32,7 @@ class Health:
             self._node.publish(TOPIC, {"header": header, "status": status})
 
 
-def parts(robot: Robot, space: str) -> list[Message]:
+def parts(robot: SimRobot, space: str) -> list[Message]:
     """Return ``diagnostic_msgs/DiagnosticStatus`` of a robot's parts.
 
     Args:
@@ -69,7 +69,7 @@ def parts(robot: Robot, space: str) -> list[Message]:
 
 
 def _part(
-    robot: Robot, name: str, level: int, message: str, values: dict[str, str]
+    robot: SimRobot, name: str, level: int, message: str, values: dict[str, str]
 ) -> Message:
     return {
         "level": level,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from webmap.base.geometry import Pose, normalize_angle
 from webmap.ros.rosbridge.server.encode import Publication
 from webmap.sim.feeds.feed import Feed
-from webmap.sim.graph_node import Node
+from webmap.sim.graph_node import GraphNode
 from webmap.sim.messages import Message, pose, read_pose
 
 PARTICLES = 150
@@ -102,7 +102,7 @@ class Belief:
 class Localizations:
     """Publishes ``amcl_pose`` and ``particlecloud``; reads ``initialpose``."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: GraphNode) -> None:
         self._node = node
         self._beliefs = [Belief() for _ in node.world.robots]
         self._random = np.random.default_rng(node.world.options.seed)
@@ -164,7 +164,7 @@ class Localizations:
 class Satellites:
     """Makes ``sensor_msgs/NavSatFix`` with the true positions of robots."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: GraphNode) -> None:
         self._node = node
         self.feed = Feed("fix", "sensor_msgs/NavSatFix", 0.5, self._make)
 

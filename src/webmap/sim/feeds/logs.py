@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 from webmap.sim.feeds.health import LOW
-from webmap.sim.graph_node import Node
-from webmap.sim.navigator import Goal, GoalState
-from webmap.sim.robot import Robot
+from webmap.sim.graph_node import GraphNode
+from webmap.sim.navigator import GoalState, SimGoal
+from webmap.sim.robot import SimRobot
 
 TOPIC = "/rosout"
 INFO, WARN, ERROR = "info", "warn", "error"
@@ -18,7 +18,7 @@ Line = tuple[str, str, str]
 
 @dataclass(slots=True)
 class _Before:
-    goal: Goal | None = None
+    goal: SimGoal | None = None
     paths: int = 0
     bumped: bool = False
     low: bool = False
@@ -27,7 +27,7 @@ class _Before:
 class Logs:
     """Publishes ``rosgraph_msgs/Log``, which ROS 2 calls ``rcl_interfaces/Log``."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: GraphNode) -> None:
         self._node = node
         self._before = [_Before() for _ in node.world.robots]
         self._had_subscriber = False
@@ -57,7 +57,7 @@ class Logs:
             for line in lines if has_subscriber else ():
                 self._log(robot, *line)
 
-    def _log(self, robot: Robot, level: str, node: str, text: str) -> None:
+    def _log(self, robot: SimRobot, level: str, node: str, text: str) -> None:
         messages = self._node.messages
         now = self._node.graph.clock()
         if messages.dialect.is_ros2:
@@ -84,7 +84,9 @@ class Logs:
         self._node.publish(TOPIC, message)
 
 
-def _news(robot: Robot, goal: Goal | None, paths: int, before: _Before) -> list[Line]:
+def _news(
+    robot: SimRobot, goal: SimGoal | None, paths: int, before: _Before
+) -> list[Line]:
     """Return the log messages that are due, and remember them."""
     lines: list[Line] = []
     if goal is not before.goal:

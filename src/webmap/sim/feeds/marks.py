@@ -5,7 +5,7 @@ from typing import Any
 
 from webmap.base.geometry import Pose
 from webmap.sim.feeds.feed import Feed
-from webmap.sim.graph_node import Node
+from webmap.sim.graph_node import GraphNode
 from webmap.sim.messages import Message, pose
 
 ARROW, CYLINDER, TEXT = 0, 3, 9
@@ -19,10 +19,10 @@ SEEN_FOR = 1.0
 GREEN, ORANGE, INK = (0.1, 0.6, 0.3), (0.9, 0.45, 0.1), (0.2, 0.25, 0.3)
 
 
-class Marks:
+class MarkerFeed:
     """Makes ``visualization_msgs/MarkerArray`` in the map's frame."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: GraphNode) -> None:
         self._node = node
         self.feed = Feed("markers", "visualization_msgs/MarkerArray", 0.2, self._make)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from webmap.base.geometry import Pose
 from webmap.sim.feeds.feed import Feed
-from webmap.sim.graph_node import Node
+from webmap.sim.graph_node import GraphNode
 from webmap.sim.messages import Message, float32, vector
 from webmap.sim.obstacles import Obstacles
 
@@ -159,7 +159,7 @@ class Change:
     cells: NDArray[np.int8]
 
 
-class Published:
+class CostmapState:
     """The state that subscribers of one costmap have, and their next message."""
 
     def __init__(self) -> None:
@@ -202,11 +202,11 @@ class Published:
 class CostmapTopics:
     """Publishes ``nav_msgs/OccupancyGrid`` and ``map_msgs/OccupancyGridUpdate``."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: GraphNode) -> None:
         self._node = node
         ros2 = node.messages.dialect.is_ros2
         self._above = "" if ros2 else "move_base/"
-        self._published: dict[str, Published] = {}
+        self._published: dict[str, CostmapState] = {}
         self._turn = 0
 
     @cached_property
@@ -267,7 +267,7 @@ class CostmapTopics:
         place: tuple[float, float],
     ) -> None:
         node = self._node
-        published = self._published.setdefault(topic, Published())
+        published = self._published.setdefault(topic, CostmapState())
         due = published.next(cells, place, node.graph.topics[topic].subscribers)
         now = node.graph.clock()
         if isinstance(due, Change):
@@ -295,7 +295,7 @@ class CostmapTopics:
 class Footprints:
     """Makes ``geometry_msgs/PolygonStamped`` in the frame of odometry."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: GraphNode) -> None:
         self._node = node
         name = (
             "local_costmap/published_footprint"
@@ -324,7 +324,7 @@ def outline(at: Pose, radius: float) -> list[tuple[float, float]]:
 class Lookaheads:
     """Makes ``geometry_msgs/PointStamped`` in the frame of the base, as Nav2 does."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: GraphNode) -> None:
         self._node = node
         self.feed = Feed(
             "lookahead_point", "geometry_msgs/PointStamped", 0.2, self._make

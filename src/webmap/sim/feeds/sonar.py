@@ -6,9 +6,9 @@ import numpy as np
 
 from webmap.base.geometry import Pose
 from webmap.sim.feeds.feed import Feed
-from webmap.sim.graph_node import Node
+from webmap.sim.graph_node import GraphNode
 from webmap.sim.messages import Message, float32
-from webmap.sim.scanner import Rays, shade
+from webmap.sim.scanner import ScannerRays, shade
 
 FRAME = "sonar"
 MOUNTED = Pose(0.25)
@@ -23,10 +23,10 @@ _ULTRASOUND = 0
 class Sonars:
     """Makes ``sensor_msgs/Range``: the distance to the nearest obstacle in its cone."""
 
-    def __init__(self, node: Node) -> None:
+    def __init__(self, node: GraphNode) -> None:
         self._node = node
         bearings = np.linspace(-FIELD / 2, FIELD / 2, _RAYS)
-        self._rays = Rays(node.world.obstacles, bearings, FARTHEST)
+        self._rays = ScannerRays(node.world.obstacles, bearings, FARTHEST)
         self.feed = Feed("sonar", "sensor_msgs/Range", 0.2, self._make)
 
     def distance(self, index: int) -> float:

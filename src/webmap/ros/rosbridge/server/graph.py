@@ -37,7 +37,7 @@ ServiceHandler = Callable[[dict[str, Any], Respond], None]
 
 
 @dataclass(slots=True)
-class Topic:
+class GraphTopic:
     """A topic with its type, publishers and subscribers."""
 
     name: str
@@ -92,7 +92,7 @@ class Graph:
     ) -> None:
         self.schema = schema
         self.clock = clock
-        self.topics: dict[str, Topic] = {}
+        self.topics: dict[str, GraphTopic] = {}
         self.services: dict[str, Service] = {}
         self.actions: dict[str, ActionServer] = {}
 
@@ -234,7 +234,7 @@ class Graph:
             return dict(args) if isinstance(args, Mapping) else {}
         return self.schema.conform(request, args)
 
-    def _topic(self, name: str, type_name: str | None) -> Topic:
+    def _topic(self, name: str, type_name: str | None) -> GraphTopic:
         name = resolve(name)
         topic = self.topics.get(name)
         if type_name is None:
@@ -247,11 +247,11 @@ class Graph:
         if not self.schema.knows(canonical_name):
             raise GraphError(f"Unable to load the message type {type_name}")
         if topic is None:
-            topic = self.topics[name] = Topic(name, canonical_name)
+            topic = self.topics[name] = GraphTopic(name, canonical_name)
         if topic.type != canonical_name:
             raise GraphError(f"{name} is a {topic.type}, not a {type_name}")
         return topic
 
-    def _forget_if_unused(self, topic: Topic) -> None:
+    def _forget_if_unused(self, topic: GraphTopic) -> None:
         if not topic.publishers and not topic.subscribers:
             self.topics.pop(topic.name, None)

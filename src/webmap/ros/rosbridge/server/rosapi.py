@@ -7,7 +7,12 @@ from typing import Any
 
 from webmap.ros.definitions import FLOATS, INTEGERS, TIMES, Field, UnknownType
 from webmap.ros.rosbridge.server.dialect import canonical, resolve
-from webmap.ros.rosbridge.server.graph import Graph, Respond, ServiceFailed, Topic
+from webmap.ros.rosbridge.server.graph import (
+    Graph,
+    GraphTopic,
+    Respond,
+    ServiceFailed,
+)
 from webmap.ros.rosbridge.server.quirks import Quirks
 from webmap.ros.rosbridge.server.schema import Schema
 
@@ -81,7 +86,7 @@ class Rosapi:
     def _spell(self, type_name: str) -> str:
         return self.graph.schema.dialect.spell(type_name)
 
-    def _listed(self) -> list[Topic]:
+    def _listed(self) -> list[GraphTopic]:
         """Return the topics that rosapi lists: in ROS 2, those with a plain name."""
         hides = self.graph.schema.dialect.is_ros2
         return [

@@ -49,7 +49,7 @@ class Session(Client):
         self._handlers: Handlers = {
             **self._topics.handlers,
             **self._services.handlers,
-            **Goals(self).handlers,
+            **ClientGoals(self).handlers,
             "status": _log_status,
         }
 
@@ -316,7 +316,7 @@ def _nothing() -> None:
 _UNKNOWN = 0
 
 
-class Goals:
+class ClientGoals:
     """One client's goals. Another client cannot cancel them by id."""
 
     def __init__(self, client: Session) -> None:

@@ -22,7 +22,7 @@ log = logging.getLogger("webmap.sim")
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class SubscribeOptions:
     """The options of one ``op: subscribe``."""
 
     throttle: float = 0.0
@@ -32,18 +32,18 @@ class Request:
     compression: str = "none"
 
 
-class Subscription:
+class ClientSubscription:
     """All requests of a client for a topic, merged into one copy of each message."""
 
     def __init__(self, send: Callable[[Publication, int], None]) -> None:
         self._send = send
-        self._requests: dict[str | None, Request] = {}
+        self._requests: dict[str | None, SubscribeOptions] = {}
         self._waiting: deque[Publication] = deque()
         self._sent_at = float("-inf")
-        self.merged = Request()
+        self.merged = SubscribeOptions()
         self._got_any = False
 
-    def ask(self, identifier: str | None, request: Request) -> bool:
+    def ask(self, identifier: str | None, request: SubscribeOptions) -> bool:
         """Add a request; return whether its id is new."""
         is_new = identifier not in self._requests
         self._requests[identifier] = request
@@ -66,7 +66,7 @@ class Subscription:
         sizes = [r.fragment_size for r in requests if r.fragment_size is not None]
         asked = {r.compression for r in requests}
         dense = [c for c in ("cbor-raw", "cbor", "png") if c in asked]
-        self.merged = Request(
+        self.merged = SubscribeOptions(
             min(r.throttle for r in requests),
             min(r.queue_length for r in requests),
             min(sizes, default=None),
@@ -121,7 +121,7 @@ class Topics:
         self._client = client
         self._graph = client.graph
         self._advertised: set[str] = set()
-        self._subscriptions: dict[str, Subscription] = {}
+        self._subscriptions: dict[str, ClientSubscription] = {}
 
     @property
     def handlers(self) -> Handlers:
@@ -224,7 +224,7 @@ class Topics:
         request, identifier = _request(operation), operation.get("id")
         subscription = self._subscriptions.get(topic)
         if subscription is None:
-            subscription = Subscription(self._enqueue)
+            subscription = ClientSubscription(self._enqueue)
             subscription.ask(identifier, request)
             self._subscriptions[topic] = subscription
             try:
@@ -249,7 +249,7 @@ class Topics:
             self._client.outbox.forget(topic)
             self._graph.unsubscribe(self, topic)
 
-    def _spin_if_queued(self, topic: str, subscription: Subscription) -> None:
+    def _spin_if_queued(self, topic: str, subscription: ClientSubscription) -> None:
         if self._client.encoder.quirks.spinning_queue and subscription.spins:
             log.error(
                 "%s: a client with throttle_rate 0 and a queue left: this bridge hangs "
@@ -258,7 +258,9 @@ class Topics:
             )
             self._client.spinning = True
 
-    def _deliver(self, subscription: Subscription, publication: Publication) -> None:
+    def _deliver(
+        self, subscription: ClientSubscription, publication: Publication
+    ) -> None:
         subscription.offer(publication, self._client.now())
         if subscription.next_due is not None:
             self._client.wake()
@@ -268,12 +270,12 @@ class Topics:
         self._client.wake()
 
 
-def _request(operation: Operation) -> Request:
+def _request(operation: Operation) -> SubscribeOptions:
     compression = operation.get("compression") or "none"
     if compression not in _COMPRESSIONS:
         raise GraphError(f"compression must be of {_COMPRESSIONS}, got {compression!r}")
     size = operation.get("fragment_size")
-    return Request(
+    return SubscribeOptions(
         whole_number(operation, "throttle_rate") / 1000,
         whole_number(operation, "queue_length"),
         None if size is None else max(whole_number(operation, "fragment_size"), 1),

@@ -1,33 +1,137 @@
-"""The robots behind bridges, found or given with ``--robot``, for the console."""
+"""Searches for the robots behind bridges, once and from then on."""
 
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
 
 from webmap.base.echo import echo
-from webmap.base.errors import BridgeClosed
+from webmap.base.errors import BridgeClosed, BridgeError
 from webmap.base.text import escaped
 from webmap.config.checks import same_name
 from webmap.config.robot import RobotConfig
-from webmap.discovery import FoundRobot
-from webmap.discovery.findings import free_name
+from webmap.discovery import Findings, FoundRobot, discover
+from webmap.discovery.findings import free_name, unique_names
+from webmap.discovery.frames import receive_frames
+from webmap.discovery.robots import host_name
 from webmap.discovery.rules import VELOCITY
 from webmap.discovery.tables import OVERRULE, drawn_table, robot_table, summary_line
-from webmap.fleet.find import Found, find
-from webmap.fleet.given import Candidate, offer, set_twice
 from webmap.fleet.overrides import SETTABLE_ROLES, Overrides
-from webmap.fleet.shown import ShownRobot, ShownRobots
-from webmap.fleet.watch import LookingForLayers, LookingForRobots, on_page
-from webmap.ros.names import is_topic, is_type, normalise_topic
+from webmap.fleet.periodic_search import LayerSearch, RobotSearch, on_page
+from webmap.fleet.robot_options import (
+    Candidate,
+    drawable_topics,
+    same_name_error,
+)
+from webmap.fleet.view_robots import ViewRobot, ViewRobots
+from webmap.ros.asking import ask_topics
+from webmap.ros.names import agent_named, is_topic, is_type, normalise_topic
 
 if TYPE_CHECKING:
     from webmap import Bridge
     from webmap.console import Console
 
+LIST_ROBOTS = (
+    "List each robot with --robot NAME:ODOM:CMD_VEL:SCAN, "
+    "as in --robot Bob:/odom:/cmd_vel:/scan; "
+    "or give webmap discover a list of the topics with --topics"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class SearchResult:
+    """The robots behind one bridge, or why they are unknown."""
+
+    url: str
+    label: str
+    """A short name for the bridge, unlike all others."""
+
+    findings: Findings
+    trouble: BridgeError | None = None
+    topics: Mapping[str, str] = field(default_factory=dict)
+    """Types by topic, as listed by the bridge or given by the user."""
+
+    @property
+    def why(self) -> str:
+        """Why no robot was found, and what to do, for people; empty if some were."""
+        if self.findings.robots:
+            return ""
+        if isinstance(self.trouble, BridgeClosed):
+            return f"{self.trouble}."
+        if self.trouble is not None:
+            reason = f"the bridge has no rosapi that lists its topics: {self.trouble}"
+        else:
+            reason = " ".join(self.findings.notes).rstrip(".")
+        return f"{self.url}: {reason}. {LIST_ROBOTS}"
+
+
+async def search_bridges(
+    urls: Sequence[str], *, wait: float, topics: Mapping[str, str] | None = None
+) -> list[SearchResult]:
+    """Return the robots behind each bridge; all their names differ.
+
+    Prints on standard error that it waits for a bridge.
+
+    Args:
+        urls: The bridges' addresses.
+        wait: How long to wait for an unreachable bridge, in seconds.
+        topics: Types by topic, if the bridge does not list them.
+
+    """
+    if topics is None:
+        asked = await asyncio.gather(*(_ask(url, wait) for url in urls))
+    else:
+        asked = [(await _behind(url, topics), topics, None) for url in urls]
+    names = bridge_labels(urls)
+    named = unique_names(
+        [(name, one) for name, (one, _, _) in zip(names, asked, strict=True)]
+    )
+    return [
+        SearchResult(url, label, findings, trouble, listed)
+        for url, label, findings, (_, listed, trouble) in zip(
+            urls, names, named, asked, strict=True
+        )
+    ]
+
+
+def bridge_labels(urls: Sequence[str]) -> list[str]:
+    """Return a name for each bridge: its agent, or its host.
+
+    The port is added if others have the same name.
+    """
+    parts = [urlsplit(url) for url in urls]
+    hosts = [
+        agent_named(url) or part.hostname or "robot"
+        for url, part in zip(urls, parts, strict=True)
+    ]
+    names = [
+        host if hosts.count(host) == 1 or part.port is None else f"{host}:{part.port}"
+        for host, part in zip(hosts, parts, strict=True)
+    ]
+    taken: set[str] = set()
+    return [free_name(name, taken) for name in names]
+
+
+async def _ask(
+    url: str, wait: float
+) -> tuple[Findings, Mapping[str, str], BridgeError | None]:
+    def waiting(why: str) -> None:
+        echo(f"Waiting for the rosbridge at {url}: {why}", err=True)
+
+    try:
+        topics = await ask_topics(url, wait=wait, waiting=waiting)
+    except BridgeError as error:
+        return Findings(), {}, error
+    return await _behind(url, topics), topics, None
+
+
+async def _behind(url: str, topics: Mapping[str, str]) -> Findings:
+    return discover(topics, host_name(url), await receive_frames(url, topics))
+
 
 @dataclass(slots=True)
-class FoundFleet:
+class FleetSearch:
     """The robots that were found, and the data for later searches."""
 
     given: list[Candidate]
@@ -36,7 +140,7 @@ class FoundFleet:
     robots: list[Candidate] = field(default_factory=list)
     """Robots that were found."""
 
-    behind: "dict[Bridge, Found]" = field(default_factory=dict)
+    behind: "dict[Bridge, SearchResult]" = field(default_factory=dict)
     """The findings of each bridge, before any settings."""
 
     overrides: Overrides = field(default_factory=Overrides)
@@ -57,7 +161,7 @@ class FoundFleet:
             found = self.behind.get(bridge)
             if found is None or only_given:
                 continue
-            there = offer(given, found.topics, found.findings)
+            there = drawable_topics(given, found.topics, found.findings)
             if (bridge, there.namespace) not in taken:  # it is drawn once
                 taken.add((bridge, there.namespace))
                 lines += drawn_table(there.namespace, on_page(there.layers, grid))
@@ -89,45 +193,45 @@ class FoundFleet:
             topics: Types by topic, if a bridge does not list them.
 
         """
-        shown = ShownRobots(console, self.overrides, given=self.given, grid=grid)
+        shown = ViewRobots(console, self.overrides, given=self.given, grid=grid)
         self._add_all(shown)
         config = self.overrides.config
         given = [
-            ShownRobot(bridge, found, made, config(bridge.url, found))
+            ViewRobot(bridge, found, made, config(bridge.url, found))
             for (bridge, found), made in zip(self.given, console.given, strict=True)
             if not only_given
         ]
         bridges = dict.fromkeys([*self.behind, *(robot.bridge for robot in given)])
         for bridge in bridges:
-            looking = LookingForLayers(bridge, shown, given=given, topics=topics)
+            looking = LayerSearch(bridge, shown, given=given, topics=topics)
             _services.append(looking)
 
-    def hold(
+    def make_robots(
         self,
         console: "Console",
-        made_of: Callable[[RobotConfig], RobotConfig],
-    ) -> ShownRobots:
-        """Hold the robots found now and later, without a page.
+        part_of: Callable[[RobotConfig], RobotConfig],
+    ) -> ViewRobots:
+        """Make the robots found now and later, without a page.
 
         Args:
             console: Takes the maps under the robots.
-            made_of: Returns the part of a configuration that a robot is made of here.
+            part_of: Returns the part of a configuration that a robot is made of here.
 
         """
-        shown = ShownRobots(console, self.overrides, made_of=made_of)
+        shown = ViewRobots(console, self.overrides, part_of=part_of)
         for robot in self.given:
             shown.add(robot)
         self._add_all(shown)
         for bridge in self.behind:
-            _services.append(LookingForLayers(bridge, shown))
+            _services.append(LayerSearch(bridge, shown))
         return shown
 
-    def _add_all(self, shown: ShownRobots) -> None:
+    def _add_all(self, shown: ViewRobots) -> None:
         for robot in self.robots:
             shown.add(robot)
         for bridge, one in self.behind.items():
             robots = one.findings.robots
-            _services.append(LookingForRobots(bridge, robots, shown.came))
+            _services.append(RobotSearch(bridge, robots, shown.show_news))
 
 
 _services: list[object] = []
@@ -141,7 +245,7 @@ def find_fleet(
     wait: float,
     topics: Mapping[str, str] | None = None,
     overrides: Overrides | None = None,
-) -> FoundFleet:
+) -> FleetSearch:
     """Return the robots behind bridges, and print the findings on standard error.
 
     Args:
@@ -158,16 +262,16 @@ def find_fleet(
     """
     overrides = overrides or Overrides()
     found = asyncio.run(
-        find([bridge.url for bridge in bridges], wait=wait, topics=topics)
+        search_bridges([bridge.url for bridge in bridges], wait=wait, topics=topics)
     )
     names = [robot.name for one in found for robot in one.findings.robots]
     missing = any(isinstance(one.trouble, BridgeClosed) for one in found)
     names += [robot.found.name for robot in given]
     for sentence in overrides.check(names, all_known=not missing):
         echo(sentence, err=True)
-    fleet = FoundFleet([], overrides=overrides)
+    fleet = FleetSearch([], overrides=overrides)
     behind = {bridge: one.topics for bridge, one in zip(bridges, found, strict=True)}
-    for bridge, robot in overrides.apply_to_given(given):
+    for bridge, robot in overrides.apply_to_options(given):
         fleet.given.append(Candidate(bridge, _typed(robot, behind[bridge])))
     taken = {same_name(other.found.name) for other in fleet.given}
     for bridge, one in zip(bridges, found, strict=True):
@@ -178,7 +282,7 @@ def find_fleet(
             if any(o.is_also(Candidate(bridge, robot)) for o in fleet.given):
                 continue
             if same_name(robot.name) in taken and overrides.names(robot.name):
-                raise set_twice(robot.name)
+                raise same_name_error(robot.name)
             robot = replace(robot, name=free_name(robot.name, taken))
             echo(f"Found {summary_line(robot)}", err=True)
             fleet.robots.append(Candidate(bridge, robot))
@@ -186,9 +290,9 @@ def find_fleet(
     return fleet
 
 
-def given_fleet(
+def fleet_of_options(
     bridges: Sequence["Bridge"], given: Sequence[Candidate], *, wait: float
-) -> FoundFleet:
+) -> FleetSearch:
     """Return robots given with ``--robot``, with the findings of their bridges.
 
     Prints on standard error if a bridge does not list its topics.
@@ -199,14 +303,14 @@ def given_fleet(
         wait: How long to wait for an unreachable bridge, in seconds.
 
     """
-    found = asyncio.run(find([bridge.url for bridge in bridges], wait=wait))
+    found = asyncio.run(search_bridges([bridge.url for bridge in bridges], wait=wait))
     for one in found:
         if one.trouble is not None:
             echo(
                 f"{one.url}: {one.trouble}. Only the topics of --robot can be drawn.",
                 err=True,
             )
-    return FoundFleet([*given], behind=dict(zip(bridges, found, strict=True)))
+    return FleetSearch([*given], behind=dict(zip(bridges, found, strict=True)))
 
 
 def _typed(robot: FoundRobot, topics: Mapping[str, str]) -> FoundRobot:

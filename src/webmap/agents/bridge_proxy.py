@@ -16,8 +16,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from webmap.agents.address import Sender
-from webmap.agents.allowance import Allowance
-from webmap.agents.data import (
+from webmap.agents.data_messages import (
     MOST_OF_DISPLAY,
     Bye,
     Ping,
@@ -26,6 +25,7 @@ from webmap.agents.data import (
     read_op,
     unpack,
 )
+from webmap.agents.rate_limit import UserRateLimit
 from webmap.base.errors import WireError
 from webmap.ros.names import is_type, same_type, split_type
 from webmap.ros.rosbridge import ops
@@ -48,7 +48,7 @@ CHANGE = 1.0
 LEAST_THROTTLE = 50
 """The least milliseconds between two messages of types that replace each other."""
 
-MOST_CLIENTS, MOST_WISHES, MOST_CALLS = 100, 2000, 32
+MOST_CLIENTS, MOST_SUBSCRIPTIONS, MOST_CALLS = 100, 2000, 32
 """Connections, subscriptions and unanswered calls of one user of the router at once;
 of the calls, one display has half at most."""
 
@@ -67,7 +67,7 @@ READING = frozenset(
 """Services that change nothing and end quickly; a display may call them."""
 
 
-class Wish(NamedTuple):
+class TopicOptions(NamedTuple):
     """What one display wants of a topic, or what the agent wants for all of them."""
 
     type: str | None
@@ -77,13 +77,13 @@ class Wish(NamedTuple):
 
 
 @dataclass
-class AgentTopic:
+class SharedTopic:
     """A topic to which displays are subscribed."""
 
     name: str
-    wishes: dict[tuple[Sender, str | None], Wish] = field(default_factory=dict)
+    options: dict[tuple[Sender, str | None], TopicOptions] = field(default_factory=dict)
     """By connection and the id of its subscription."""
-    sent: Wish | None = None
+    sent: TopicOptions | None = None
     """The subscription at the rosbridge."""
     number: int = 0
     changed_at: float = 0.0
@@ -95,7 +95,7 @@ class AgentTopic:
     json: bool | None = False
     """Whether it is requested in JSON, as no CBOR came; None if it is not too large."""
 
-    def merged(self, known: str | None, least_throttle: int) -> Wish:
+    def merged(self, known: str | None, least_throttle: int) -> TopicOptions:
         """Return one subscription that serves all displays.
 
         Args:
@@ -104,28 +104,28 @@ class AgentTopic:
             least_throttle: The least milliseconds between two messages.
 
         """
-        wishes = list(self.wishes.values())
-        types = {wish.type for wish in wishes if wish.type}
+        options = list(self.options.values())
+        types = {each.type for each in options if each.type}
         type = known or (types.pop() if len(types) == 1 else None)
         least, compression = least_throttle, "none"
         if each_counts(self.name, type):
             least = 0
-        queue = min(max(wish.queue for wish in wishes), ops.BURST)
+        queue = min(max(each.queue for each in options), ops.BURST)
         if type and is_type(type, *REPLACED, "sensor_msgs/LaserScan"):
             least, queue = max(least, LEAST_THROTTLE), 1
-        in_text = any(wish.compression == "none" for wish in wishes)
+        in_text = any(each.compression == "none" for each in options)
         if self.json is False and in_text and not self.count:
             self.json = type is not None and is_type(type, *REPLACED)
         if self.json:
             least = max(least, THROTTLE)
         elif type and is_type(type, *BULK):
             compression = "cbor"
-        throttle = max(min(wish.throttle for wish in wishes), least)
-        return Wish(type, throttle, queue, compression)
+        throttle = max(min(each.throttle for each in options), least)
+        return TopicOptions(type, throttle, queue, compression)
 
 
 class Call(NamedTuple):
-    """A service that a display calls."""
+    """A service call of a display, until the rosbridge answers it."""
 
     client: Sender
     id: str | None
@@ -134,7 +134,7 @@ class Call(NamedTuple):
     args: bytes
 
 
-class Clients:
+class BridgeProxy:
     """All connections of displays to the rosbridge of an agent.
 
     Args:
@@ -170,15 +170,15 @@ class Clients:
         self._calls = calls
         self._details = details
         self._throttles = dict(throttles or {})
-        self._heard: dict[Sender, float] = {}
-        self._topics: dict[str, AgentTopic] = {}
+        self._pinged_at: dict[Sender, float] = {}
+        self._topics: dict[str, SharedTopic] = {}
         self._types: dict[str, str] = {}
         """The types of topics, as the rosbridge reports them."""
-        self._wishes: Counter[str] = Counter()
+        self._subscriptions: Counter[str] = Counter()
         """The subscriptions of each user."""
         self._calling: Counter[str] = Counter()
         """The calls that are not answered, of each user and of each display."""
-        self._catching_up = Allowance("subscriptions", size=4 << 20)
+        self._catching_up = UserRateLimit("subscriptions", size=4 << 20)
         self._advertised: dict[str, set[Sender]] = {}
         self._numbers = 0
         self.session = ""
@@ -193,7 +193,7 @@ class Clients:
 
     @property
     def asks_types(self) -> bool:
-        """Whether to ask the rosbridge for the types of its topics."""
+        """Whether a display needs a topic whose type is not known yet."""
         return bool(self.session and self._topics.keys() - self._types.keys())
 
     def typed(self, types: Mapping[str, str], now: float) -> None:
@@ -228,22 +228,22 @@ class Clients:
         if isinstance(received, Bye):
             self._end(client, now)
             return
-        if client not in self._heard:
-            mine = [each for each in self._heard if each.user == client.user]
+        if client not in self._pinged_at:
+            mine = [each for each in self._pinged_at if each.user == client.user]
             if len(mine) >= MOST_CLIENTS:
                 raise WireError(
                     f"got more than {MOST_CLIENTS} connections of the user "
                     f"{client.user}"
                 )
-        self._heard[client] = now
+        self._pinged_at[client] = now
         if isinstance(received, Ping):
             self._note(client, Pong(received.number, self.session, self.trouble))
         elif isinstance(received, bytes):
             self._do(client, read_op(received), received, now)
 
-    def look(self, now: float) -> None:
+    def check(self, now: float) -> None:
         """End the connections of displays that are gone; change what has to change."""
-        for client, at in list(self._heard.items()):
+        for client, at in list(self._pinged_at.items()):
             if now - at > GONE:
                 self._end(client, now)
         for topic in list(self._topics.values()):
@@ -267,7 +267,7 @@ class Clients:
 
         """
         topic = self._topics.get(name)
-        if topic is None or not topic.wishes:
+        if topic is None or not topic.options:
             return False
         if topic.json and not in_parts:  # it was published late, and is not too large
             topic.json = None
@@ -339,24 +339,24 @@ class Clients:
         self._reply(client, ops.status("error", text, id=id))
 
     def _subscribe(self, client: Sender, op: SubscribeOp, now: float) -> None:
-        topic = self._topics.get(op.topic) or AgentTopic(op.topic)
-        if (client, op.id) not in topic.wishes:
-            if self._wishes[client.user] >= MOST_WISHES:
+        topic = self._topics.get(op.topic) or SharedTopic(op.topic)
+        if (client, op.id) not in topic.options:
+            if self._subscriptions[client.user] >= MOST_SUBSCRIPTIONS:
                 raise WireError(
-                    f"got more than {MOST_WISHES} subscriptions of the user "
+                    f"got more than {MOST_SUBSCRIPTIONS} subscriptions of the user "
                     f"{client.user}"
                 )
-            self._wishes[client.user] += 1
+            self._subscriptions[client.user] += 1
         self._topics[op.topic] = topic
         queue, throttle = max(1, op.queue_length), max(1, op.throttle_rate)
-        wish = Wish(op.type, throttle, queue, op.compression)
-        topic.wishes[client, op.id] = wish
+        options = TopicOptions(op.type, throttle, queue, op.compression)
+        topic.options[client, op.id] = options
         served = topic.sent
         self._update(topic, now)
         if served is not None and served == topic.sent:
             self._catch_up(topic, client, now)
 
-    def _catch_up(self, topic: AgentTopic, client: Sender, now: float) -> None:
+    def _catch_up(self, topic: SharedTopic, client: Sender, now: float) -> None:
         """Give a late display the message that a latched topic sent before."""
         if topic.newest:
             if self._catching_up.admits(client.user, len(topic.newest), now):
@@ -365,35 +365,35 @@ class Clients:
             topic.sent = None  # a new subscription gets the message again
             self._update(topic, now)
 
-    def _update(self, topic: AgentTopic, now: float) -> None:
+    def _update(self, topic: SharedTopic, now: float) -> None:
         """Subscribe as all displays need it, but change that once a second at most."""
         if topic.number and now - topic.changed_at < CHANGE and self.session:
             return
-        if not topic.wishes:
+        if not topic.options:
             del self._topics[topic.name]
             if topic.number and self.session:
                 self._upstream(ops.unsubscribe(topic.name, id=f"agent-{topic.number}"))
             return
         known = self._types.get(topic.name)
-        wish = topic.merged(
+        options = topic.merged(
             str(split_type(known)) if known else None,
             self._throttles.get(topic.name, 0),
         )
-        if wish == topic.sent or not self.session:
+        if options == topic.sent or not self.session:
             return
         if topic.number:
             self._upstream(ops.unsubscribe(topic.name, id=f"agent-{topic.number}"))
         self._numbers += 1
-        topic.number, topic.sent, topic.changed_at = self._numbers, wish, now
+        topic.number, topic.sent, topic.changed_at = self._numbers, options, now
         topic.count, topic.newest = 0, b""
         self._upstream(
             ops.subscribe(
                 topic.name,
                 id=f"agent-{topic.number}",
-                type=wish.type,
-                throttle_rate=wish.throttle,
-                queue_length=wish.queue,
-                compression=wish.compression,
+                type=options.type,
+                throttle_rate=options.throttle,
+                queue_length=options.queue,
+                compression=options.compression,
             )
         )
 
@@ -401,15 +401,15 @@ class Clients:
         self, name: str, client: Sender, id: str | None, now: float
     ) -> None:
         topic = self._topics.get(name)
-        if topic is None or topic.wishes.pop((client, id), None) is None:
+        if topic is None or topic.options.pop((client, id), None) is None:
             return
-        self._wishes -= Counter((client.user,))
+        self._subscriptions -= Counter((client.user,))
         self._update(topic, now)
 
     def _end(self, client: Sender, now: float) -> None:
-        self._heard.pop(client, None)
+        self._pinged_at.pop(client, None)
         for topic in list(self._topics.values()):
-            for other, id in list(topic.wishes):
+            for other, id in list(topic.options):
                 if other == client:
                     self._unsubscribe(topic.name, client, id, now)
         for name, users in list(self._advertised.items()):

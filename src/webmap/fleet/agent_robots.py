@@ -1,4 +1,4 @@
-"""The robots that an agent holds: found behind a rosbridge, or of a fleet file."""
+"""The robots of an agent: found behind its rosbridge, or of a fleet file."""
 
 import logging
 from collections.abc import Callable, Mapping, Sequence
@@ -12,11 +12,11 @@ from webmap.config.fleet import read_fleet
 from webmap.config.robot import RobotConfig
 from webmap.config.toml_text import read_text, readable_secret
 from webmap.console import Console, make_robot
-from webmap.fleet.found import find_fleet
-from webmap.fleet.given import given_robots
-from webmap.fleet.made import make_bridges
+from webmap.fleet.fleet_file import make_bridges
 from webmap.fleet.overrides import Overrides
-from webmap.fleet.passed_on import check_passed_on, load_pictures
+from webmap.fleet.robot_files import check_agent_fleet, load_pictures
+from webmap.fleet.robot_options import parse_robots
+from webmap.fleet.search import find_fleet
 from webmap.ros.rosbridge.checks import is_loopback, listening_addresses
 from webmap.ros.tf import Buffer
 
@@ -26,28 +26,28 @@ if TYPE_CHECKING:
 log = logging.getLogger("webmap.agent")
 
 
-class HeldRobot(NamedTuple):
-    """A robot that the agent holds."""
+class AgentRobot(NamedTuple):
+    """A robot of an agent, with the id that its gate uses."""
 
     id: str
     config: RobotConfig
 
 
-class Held(NamedTuple):
+class AgentRobots(NamedTuple):
     """The robots of an agent and the maps under them, behind one rosbridge."""
 
     bridge: "Bridge"
-    robots: Callable[[], list[HeldRobot]]
-    """Returns the robots that the agent holds now."""
+    robots: Callable[[], list[AgentRobot]]
+    """Returns the robots that are known now."""
     grids: Callable[[], Mapping[str, dict[str, Any]]]
     """Returns the options of the maps under the robots, by topic."""
     pictures: Mapping[str, bytes] = {}
     """The pictures of the robots, by the names in their configurations."""
 
 
-def held_behind(
+def robots_behind(
     url: str, robots: Sequence[str], overrides: Overrides, wait: float
-) -> Held:
+) -> AgentRobots:
     """Return the robots behind a rosbridge, found by their topics or given.
 
     Args:
@@ -61,17 +61,17 @@ def held_behind(
 
     """
     bridge, console = webmap.Bridge(url), Console()
-    given = given_robots(robots, [bridge])
+    given = parse_robots(robots, [bridge])
     fleet = find_fleet([bridge], given, wait=wait, overrides=overrides)
-    shown = fleet.hold(console, moving_parts)
-    return Held(
+    shown = fleet.make_robots(console, moving_parts)
+    return AgentRobots(
         bridge,
-        lambda: [HeldRobot(each.robot.motion.id, each.config) for each in shown.shown],
+        lambda: [AgentRobot(each.robot.motion.id, each.config) for each in shown.shown],
         lambda: {topic: options for (_, topic), options in console.grids.items()},
     )
 
 
-def held_in_file(file: Path) -> Held:
+def robots_in_file(file: Path) -> AgentRobots:
     """Return the robots of a fleet file with one bridge.
 
     Raises:
@@ -83,7 +83,7 @@ def held_in_file(file: Path) -> Held:
     fleet = read_fleet(text.data, mistakes)
     if not mistakes.found and len(fleet.bridges) != 1:
         mistakes.add(("bridges",), "an agent is beside the robots of one bridge")
-    check_passed_on(fleet, mistakes)
+    check_agent_fleet(fleet, mistakes)
     configs, pictures = load_pictures(fleet.robots, file.parent, mistakes)
     text.refuse(mistakes)
     warning = readable_secret(file, text.data)
@@ -92,9 +92,9 @@ def held_in_file(file: Path) -> Held:
     bridges = make_bridges(fleet)
     (bridge,) = bridges.values()
     made = [make_robot(moving_parts(config), bridges) for config in configs]
-    _kept.extend(made)
+    _robots.extend(made)
     robots = [
-        HeldRobot(robot.motion.id, config)
+        AgentRobot(robot.motion.id, config)
         for robot, config in zip(made, configs, strict=True)
     ]
     grids: dict[str, dict[str, Any]] = {}
@@ -103,10 +103,10 @@ def held_in_file(file: Path) -> Held:
         grids[grid.topic] = {
             key: value for key, value in options.items() if value is not None
         }
-    return Held(bridge, lambda: robots, lambda: grids, pictures)
+    return AgentRobots(bridge, lambda: robots, lambda: grids, pictures)
 
 
-_kept: list[object] = []
+_robots: list[object] = []
 """Robots that live as long as the process."""
 
 
@@ -128,7 +128,7 @@ def moving_parts(config: RobotConfig) -> RobotConfig:
     )
 
 
-def open_at(url: str) -> list[str] | None:
+def open_addresses(url: str) -> list[str] | None:
     """Return where other computers may reach a rosbridge; None if it is unknown.
 
     Args:

@@ -8,14 +8,14 @@ import msgspec
 import pytest
 from agent_reports import NAME, REPORT
 
-from webmap.agents.displays import (
+from webmap.agents.displays import Displays
+from webmap.agents.gate_messages import (
     AllReports,
-    Answer,
-    Displays,
     FromDisplay,
-    Took,
+    SampleAck,
+    StopAck,
 )
-from webmap.agents.far_gate import FarGate
+from webmap.agents.remote_gate import RemoteGate
 from webmap.base.errors import WireError
 from webmap.gate import commands
 from webmap.gate.protocol import (
@@ -76,7 +76,7 @@ class Bench:
         self.sent = []
         self.ways = []
         self.displays = Displays()
-        self.far = FarGate("bay3", NAME, self.owner, threading.RLock(), self.publish)
+        self.far = RemoteGate("bay3", NAME, self.owner, threading.RLock(), self.publish)
 
     def publish(self, sample, only):
         self.sent.append(sample)
@@ -160,7 +160,7 @@ def test_a_stop_is_sent_again_until_the_agent_has_it(connected, text):
         connected.far.beat(now)
     got, took = connected.arrive(0.1)
     assert got == stop
-    connected.receive(Took(NAME, took.session, took.number - 1), 0.12)  # of another
+    connected.receive(StopAck(NAME, took.session, took.number - 1), 0.12)  # of another
     connected.far.beat(0.25)
     got, took = connected.arrive(0.25)
     assert got == stop
@@ -172,7 +172,7 @@ def test_a_stop_is_sent_again_until_the_agent_has_it(connected, text):
 def test_the_acknowledgement_of_another_display_ends_nothing(connected):
     connected.far.send(STOP)
     _, took = connected.arrive()
-    connected.receive(Took("ben.5e", took.session, took.number), 0.05)
+    connected.receive(StopAck("ben.5e", took.session, took.number), 0.05)
     connected.far.beat(0.15)
     assert STOP in connected.arrive(0.15)
 
@@ -230,7 +230,7 @@ def test_an_agent_that_returns_gets_the_pages_and_a_kept_stop_again(connected):
     connected.receive(Tick(9, {}), 5.0)
     connected.far.beat(5.05)
     got = connected.arrive(5.05)
-    assert [each for each in got if not isinstance(each, Took)] == [
+    assert [each for each in got if not isinstance(each, StopAck)] == [
         Disconnect(PROGRAM.connection),
         Disconnect(PAGE.connection),
         PROGRAM,
@@ -300,7 +300,7 @@ def test_samples_that_are_none_are_refused(connected):
 )
 def test_a_program_stops_resets_and_cancels_at_an_agent(connected, command, text):
     connected.far.send(FromProgram(command))
-    got = next(each for each in connected.arrive() if not isinstance(each, Took))
+    got = next(each for each in connected.arrive() if not isinstance(each, StopAck))
     assert got.connection == PROGRAM.connection or got == FromProgram(command)
     if isinstance(got, FromPage):
         assert json.loads(got.text) == text
@@ -379,7 +379,7 @@ def test_the_first_command_of_an_idle_display_follows_an_answer(connected):
     connected.far.send(take)
     assert connected.arrive(2.95) == [take]
     connected.receive(REPORT, 2.95)
-    assert connected.displays.look(3.0) == []
+    assert connected.displays.check(3.0) == []
     connected.sent.clear()
     connected.far.send(take)
     assert len(connected.sent) == 1
@@ -428,7 +428,7 @@ class Lossy(Bench):
 
     def is_lost(self, message):
         kind = type(message).__name__
-        if isinstance(message, Answer):
+        if isinstance(message, SampleAck):
             kind = "list" if message.pages is not None else "answer"
         if kind not in self.lost:
             return False
@@ -458,7 +458,7 @@ class Lossy(Bench):
                     self.gate[connection] = (v, w)
                 case FromPage(_, text) if b"stop" in text:
                     self.gate["stop"] = True
-                case Took() | Hello():
+                case StopAck() | Hello():
                     self.report(message)
 
     def step(self):
@@ -470,7 +470,7 @@ class Lossy(Bench):
             if not self.is_lost(msgspec.msgpack.decode(sample[16:], type=FromDisplay)):
                 self.obey(self.displays.receive(NAME, sample, self.now))
         self.obey(self.displays.waiting_stops())
-        self.obey(self.displays.look(self.now))
+        self.obey(self.displays.check(self.now))
         if self.displays.wants_reports(self.now):
             self.report(AllReports(tuple(self.robots.values()), tuple(self.robots)))
 
@@ -489,7 +489,7 @@ class Lossy(Bench):
         "AllReports",
         "RobotReport AllReports",
         "RobotGone answer",
-        "Took",
+        "StopAck",
     ],
 )
 def test_after_each_kind_of_lost_sample_both_sides_agree_again(lost, seed):

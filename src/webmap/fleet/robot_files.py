@@ -1,4 +1,4 @@
-"""What an agent passes on of the files and addresses of its robots, and what not.
+"""The files and addresses of a robot, and what an agent passes on of them.
 
 Files and addresses of an agent are on its computer and in its network. The agent loads
 pictures there and passes them on; a display opens no file and no address that an agent
@@ -6,6 +6,7 @@ names.
 """
 
 import hashlib
+import io
 import re
 from collections.abc import Container, Mapping
 from contextlib import suppress
@@ -14,7 +15,7 @@ from typing import Any
 
 import msgspec
 
-from webmap.agents.far_camera import FarCamera
+from webmap.agents.remote_camera import RemoteCamera
 from webmap.base.errors import ConfigError, WireError
 from webmap.config.buttons import read_buttons
 from webmap.config.checks import KeyPath, Mistakes
@@ -25,11 +26,16 @@ from webmap.config.robot import (
     RobotConfig,
     named_cameras,
 )
-from webmap.fleet.files import check_picture, picture_file
 from webmap.ros.image_address import parse_address
 from webmap.ros.messages_image import MAX_PIXELS
 from webmap.ros.rosbridge.graph import SET_PARAM
 from webmap.server.files import MEDIA_TYPES
+
+MOST_PIXELS = 1 << 26
+"""Most pixels of a picture: a browser uses four bytes for each."""
+
+FORMATS = ("BMP", "GIF", "ICO", "JPEG", "PNG", "WEBP")
+"""Formats of pictures that browsers show, by the names of Pillow."""
 
 LARGEST = 1 << 20
 """Most bytes of the picture of a robot that an agent passes on."""
@@ -43,7 +49,7 @@ OF_DISPLAYS = ("floor", "image", "modules", "tiles", "labels")
 _SERVED = re.compile(r"[0-9a-f]{32}(\.[a-z]{3,4})")
 
 
-def check_passed_on(fleet: FleetConfig, mistakes: Mistakes) -> None:
+def check_agent_fleet(fleet: FleetConfig, mistakes: Mistakes) -> None:
     """Note what is in an agent's fleet file and would not reach a display."""
     for key in OF_DISPLAYS:
         if getattr(fleet, key):
@@ -101,7 +107,7 @@ def load_pictures(
             file = folder / picture.file
             try:
                 data, media_type = picture_file(file)
-                check_far(file, data, media_type)
+                check_agent_picture(file, data, media_type)
             except (ConfigError, OSError) as error:
                 mistakes.add(("robots", index, "picture", "file"), str(error))
             else:
@@ -113,7 +119,7 @@ def load_pictures(
     return loaded, pictures
 
 
-def check_far(file: Path, data: bytes, media_type: str) -> None:
+def check_agent_picture(file: Path, data: bytes, media_type: str) -> None:
     """Check the picture of a robot that comes from an agent.
 
     Raises:
@@ -131,7 +137,7 @@ def check_far(file: Path, data: bytes, media_type: str) -> None:
         raise ConfigError(f"{str(file)!r} has entities; save it without them")
 
 
-def received_picture(name: str, data: bytes) -> tuple[bytes, str]:
+def picture_from_agent(name: str, data: bytes) -> tuple[bytes, str]:
     """Return a picture that an agent gave under a name, and its media type.
 
     Raises:
@@ -139,17 +145,17 @@ def received_picture(name: str, data: bytes) -> tuple[bytes, str]:
 
     """
     media_type = MEDIA_TYPES[Path(name).suffix]
-    check_far(Path(name), data, media_type)
+    check_agent_picture(Path(name), data, media_type)
     return data, media_type
 
 
-def is_served(name: str) -> bool:
+def is_picture_name(name: str) -> bool:
     """Return whether an agent may have a picture under this name."""
     found = _SERVED.fullmatch(name)
     return found is not None and MEDIA_TYPES.get(found[1], "").startswith("image/")
 
 
-def passed_on(config: RobotConfig) -> RobotConfig:
+def config_for_displays(config: RobotConfig) -> RobotConfig:
     """Return what displays get of a robot: addresses of cameras without secrets."""
     cameras = [
         msgspec.structs.replace(each, url=parse_address(each.url).shown)
@@ -160,7 +166,7 @@ def passed_on(config: RobotConfig) -> RobotConfig:
     return msgspec.structs.replace(config, cameras=cameras)
 
 
-def actions(config: RobotConfig) -> list[dict[str, str]]:
+def button_actions(config: RobotConfig) -> list[dict[str, str]]:
     """Return the topic or the service, and the parameter, that each button writes."""
     found = []
     for _, module in config.layers():
@@ -177,14 +183,14 @@ def actions(config: RobotConfig) -> list[dict[str, str]]:
     return found
 
 
-def check_parameters(service: str, args: Any, actions: list[dict[str, str]]) -> None:
+def check_parameters(service: str, args: Any, buttons: list[dict[str, str]]) -> None:
     """Check that a call sets no other parameter of a node than those of buttons.
 
     Raises:
         WireError: If it does.
 
     """
-    own = {each.get("parameter") for each in actions if each.get("service") == service}
+    own = {each.get("parameter") for each in buttons if each.get("service") == service}
     if not own or None in own:  # no parameter, or a button that calls the service
         return
     try:
@@ -196,7 +202,7 @@ def check_parameters(service: str, args: Any, actions: list[dict[str, str]]) -> 
         raise WireError("the agent has no button for this parameter")
 
 
-def accepted(
+def config_from_agent(
     config: RobotConfig, agent: str, id: str, bridges: Container[str]
 ) -> tuple[RobotConfig, PictureConfig | None]:
     """Return what a display shows of a robot of an agent, and its picture.
@@ -220,13 +226,88 @@ def accepted(
                 f"a display does not open what an agent names: the module {module.name}"
             )
     picture = config.picture
-    if picture is not None and not is_served(picture.file):
+    if picture is not None and not is_picture_name(picture.file):
         raise ConfigError(f"{picture.file!r} is not a picture of the agent")
     cameras = [
-        msgspec.structs.replace(each, url=FarCamera(agent, id, each.name, each.url).url)
+        msgspec.structs.replace(
+            each, url=RemoteCamera(agent, id, each.name, each.url).url
+        )
         if each.url
         else each
         for each in named_cameras(config.cameras)
     ]
     shown = msgspec.structs.replace(config, cameras=cameras, picture=None)
     return shown, picture
+
+
+def picture_file(file: Path) -> tuple[bytes, str]:
+    """Return the contents of a file that browsers can show, and its media type.
+
+    Raises:
+        ConfigError: If there is no such file, or it is not a picture.
+
+    """
+    from webmap.server.files import IMAGES, MEDIA_TYPES, Published
+
+    known = [end for end, type in MEDIA_TYPES.items() if type.startswith("image/")]
+    if file.is_file() and file.suffix.lower() not in known:
+        raise ConfigError(
+            f"{str(file)!r} is not a picture: its name must end in {' '.join(known)}"
+        )
+    published = Published()  # raises errors of the file itself
+    found = published.image(published.publish_image(file).removeprefix(IMAGES))
+    check_picture(file, found.data, found.media_type)
+    return found.data, found.media_type
+
+
+def check_picture(
+    file: Path, data: bytes, media_type: str, most_pixels: int = MOST_PIXELS
+) -> None:
+    """Check that browsers can show a picture.
+
+    Args:
+        file: Its name, for the error.
+        data: Its content.
+        media_type: Its type, by its suffix.
+        most_pixels: The most pixels that it may have.
+
+    Raises:
+        ConfigError: If they cannot.
+
+    """
+    if media_type.startswith("image/svg"):
+        _check_svg(file, data)
+    else:
+        _check_pixels(file, data, most_pixels)
+
+
+def _check_svg(file: Path, data: bytes) -> None:
+    if b"<svg" not in data[: 1 << 16]:
+        raise ConfigError(f"{str(file)!r} is not an SVG: it has no element <svg>")
+
+
+def _check_pixels(file: Path, data: bytes, most_pixels: int) -> None:
+    from PIL import Image
+
+    try:
+        with Image.open(io.BytesIO(data), formats=FORMATS) as image:
+            width, height = image.size
+            image.verify()
+    except Exception as error:  # each picture format has its own errors
+        raise ConfigError(
+            f"{str(file)!r} cannot be read: expected a complete picture in the format "
+            f"of its suffix {file.suffix}, got {_reason(error)}"
+        ) from None
+    if width * height > most_pixels:
+        raise ConfigError(
+            f"{str(file)!r} has {width} x {height} pixels; expected {most_pixels} at "
+            f"the most"
+        )
+
+
+def _reason(error: Exception) -> str:
+    from PIL import UnidentifiedImageError
+
+    if isinstance(error, UnidentifiedImageError):
+        return "another format"
+    return str(error) or type(error).__name__

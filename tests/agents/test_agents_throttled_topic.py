@@ -5,9 +5,8 @@ import time
 
 import pytest
 
-from webmap.agents import data
-from webmap.agents.heard import Heard
-from webmap.agents.link import AgentLane
+from webmap.agents import data_messages
+from webmap.agents.link import AgentConnection, ThrottledTopic
 from webmap.ros.rosbridge import ops
 
 
@@ -50,7 +49,7 @@ def clock(monkeypatch):
 
 def test_what_is_needed_often_is_passed_on_at_once(clock):
     taken = []
-    heard = Heard(taken.append, clock)
+    heard = ThrottledTopic(taken.append, clock)
     heard.subscribe("1", 100)
     for piece in (b"a", b"b", b"c"):
         heard.arrived("key", piece)
@@ -59,7 +58,7 @@ def test_what_is_needed_often_is_passed_on_at_once(clock):
 
 def test_of_what_is_needed_rarely_only_the_newest_piece_is_read(clock):
     taken = []
-    heard = Heard(taken.append, clock)
+    heard = ThrottledTopic(taken.append, clock)
     heard.subscribe("1", 5000)
     for number in range(150):
         heard.arrived("key", b"%d" % number)
@@ -74,7 +73,7 @@ def test_of_what_is_needed_rarely_only_the_newest_piece_is_read(clock):
 
 def test_what_waits_comes_at_once_when_it_is_needed_more_often(clock):
     taken = []
-    heard = Heard(taken.append, clock)
+    heard = ThrottledTopic(taken.append, clock)
     heard.subscribe("1", 5000)
     heard.arrived("key", b"a")
     clock.advance(0.0)
@@ -91,7 +90,7 @@ def test_what_waits_comes_at_once_when_it_is_needed_more_often(clock):
 
 def test_what_waits_is_dropped_with_the_subscription(clock):
     taken = []
-    heard = Heard(taken.append, clock)
+    heard = ThrottledTopic(taken.append, clock)
     heard.subscribe("1", 5000)
     heard.arrived("key", b"a")
     clock.advance(0.0)
@@ -103,7 +102,7 @@ def test_what_waits_is_dropped_with_the_subscription(clock):
 
 def test_nothing_is_passed_to_a_loop_that_has_ended(clock):
     taken = []
-    heard = Heard(taken.append, clock)
+    heard = ThrottledTopic(taken.append, clock)
     clock.is_closed = lambda: True
     heard.subscribe("1", 100)
     heard.arrived("key", b"a")
@@ -132,7 +131,7 @@ class Peer:
 
 def test_a_connection_listens_to_a_topic_until_its_last_subscription_ends(clock):
     taken = []
-    lane = AgentLane(
+    lane = AgentConnection(
         "zenoh://router/bay3",
         opened=print,
         received=taken.append,
@@ -146,9 +145,9 @@ def test_a_connection_listens_to_a_topic_until_its_last_subscription_ends(clock)
     lane.send(ops.subscribe("/scan", id="2", throttle_rate=5000))
     lane.send(ops.unsubscribe("/scan", id="1"))
     assert len(peer.listeners) == 1  # it remains for the second subscription
-    arrived(key, data.pack_frame(b"{}"))
+    arrived(key, data_messages.pack_frame(b"{}"))
     clock.advance(0.0)
-    arrived(key, data.pack_frame(b"[]"))
+    arrived(key, data_messages.pack_frame(b"[]"))
     assert taken == [b"{}"]
     lane.send(ops.unsubscribe("/other", id="9"))
     lane.send(ops.unsubscribe("/scan", id="2"))
@@ -165,14 +164,14 @@ def test_a_new_agent_is_noticed_though_a_ping_to_the_old_one_has_no_answer(
         def put_data(self, key, piece, *, all):
             if not 101.0 < clock.now < 103.0:
                 session = "old" if clock.now < 102.0 else "new"
-                number = data.unpack(piece).number
-                lane._take(data.pack_note(data.Pong(number, session)))
+                number = data_messages.unpack(piece).number
+                lane._take(data_messages.pack_note(data_messages.Pong(number, session)))
 
     async def sleep(seconds):
         clock.now += seconds
-        lane._take(data.pack_frame(b"{}"))  # of what another display shows
+        lane._take(data_messages.pack_frame(b"{}"))  # of what another display shows
 
-    lane = AgentLane(
+    lane = AgentConnection(
         "zenoh://router/bay3",
         opened=lambda: None,
         received=lambda frame: None,

@@ -6,7 +6,7 @@ import pytest
 from webmap.base.errors import ConfigError
 from webmap.discovery import discover
 from webmap.discovery.doctor.facts import merge_configured
-from webmap.fleet.diagnose import bridges_of
+from webmap.fleet.doctor import bridges_of
 
 URL = "ws://127.0.0.1:9090"
 TOPICS = {

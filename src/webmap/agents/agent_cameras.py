@@ -1,4 +1,4 @@
-"""The cameras over HTTP beside an agent: fetched while a display looks at them.
+"""The cameras over HTTP beside an agent: fetched while a display shows them.
 
 The agent fetches only the cameras of its own configuration, and each once for all
 displays. Of the pictures that a slow link cannot carry, the older ones are left out.
@@ -15,11 +15,16 @@ from typing import NamedTuple, TypeAlias
 
 import msgspec
 
-from webmap.agents import address, looks
-from webmap.agents.address import Sender, sender_of
-from webmap.agents.allowance import Allowance
-from webmap.agents.looks import CameraPicture, Look, LookAway, Looked
+from webmap.agents import address, camera_messages
+from webmap.agents.address import Sender
+from webmap.agents.camera_messages import (
+    CameraRelease,
+    CameraReply,
+    CameraRequest,
+    PictureMessage,
+)
 from webmap.agents.peer import Peer
+from webmap.agents.rate_limit import Receiver
 from webmap.base.errors import ProtocolError, WireError
 from webmap.config.robot import RobotConfig, named_cameras
 from webmap.ros.image_address import parse_address
@@ -28,8 +33,8 @@ from webmap.ros.messages_image import CompressedImageMsg
 
 log = logging.getLogger("webmap.agent")
 
-LOOKED = 5.0
-"""Seconds after the last look of a display after which a camera is not fetched."""
+EXPIRY = 5.0
+"""Seconds after the last request of a display after which a camera is not fetched."""
 
 AHEAD = 2
 """Pictures that may be on their way while no display has got them."""
@@ -38,7 +43,7 @@ PATIENCE = 3.0
 """Seconds after which a picture that no display has got counts as lost."""
 
 MOST_DISPLAYS = 100
-"""Displays of one user that look at one camera at once."""
+"""Displays of one user that show one camera at once."""
 
 THROTTLE = 200
 """The least milliseconds between two pictures, if the configuration states none."""
@@ -47,7 +52,7 @@ Name: TypeAlias = tuple[str, str]
 """The id of a robot and the name of one of its cameras."""
 
 
-class HeldCamera(NamedTuple):
+class CameraSource(NamedTuple):
     """A camera of the agent's own configuration."""
 
     url: str
@@ -55,10 +60,10 @@ class HeldCamera(NamedTuple):
     """The least time between two pictures, in milliseconds."""
 
 
-def cameras_in(robots: Iterable[tuple[str, RobotConfig]]) -> dict[Name, HeldCamera]:
+def cameras_of(robots: Iterable[tuple[str, RobotConfig]]) -> dict[Name, CameraSource]:
     """Return the cameras over HTTP of robots, given with their ids."""
     return {
-        (id, camera.name): HeldCamera(
+        (id, camera.name): CameraSource(
             camera.url, THROTTLE if camera.throttle is None else camera.throttle
         )
         for id, config in robots
@@ -69,11 +74,11 @@ def cameras_in(robots: Iterable[tuple[str, RobotConfig]]) -> dict[Name, HeldCame
 
 @dataclass
 class _Watched:
-    """A camera at which displays look."""
+    """A camera that displays show."""
 
-    camera: HeldCamera
-    looks: dict[Sender, float] = field(default_factory=dict)
-    """When each display looked last."""
+    camera: CameraSource
+    requests: dict[Sender, float] = field(default_factory=dict)
+    """When the last request of each display came."""
     newest: tuple[bytes, float] | None = None
     """The picture to send next, and when it came."""
     flying: deque[tuple[int, float]] = field(default_factory=deque)
@@ -81,71 +86,73 @@ class _Watched:
     trouble: str = ""
 
 
-class Cameras:
+class CameraRelay:
     """Decides which cameras are fetched, and which pictures are sent. No I/O.
 
     Args:
         begin: Begins to fetch a camera.
         end: Ends to fetch a camera.
         send: Sends a picture of a camera to all displays.
-        answer: Answers a look of one display.
+        answer: Answers a request of one display.
 
     """
 
     def __init__(
         self,
         *,
-        begin: Callable[[Name, HeldCamera], None],
+        begin: Callable[[Name, CameraSource], None],
         end: Callable[[Name], None],
-        send: Callable[[Name, CameraPicture], None],
-        answer: Callable[[Sender, Looked], None],
+        send: Callable[[Name, PictureMessage], None],
+        answer: Callable[[Sender, CameraReply], None],
     ) -> None:
         self._begin = begin
         self._end = end
         self._send = send
         self._answer = answer
-        self._held: dict[Name, HeldCamera] = {}
+        self._sources: dict[Name, CameraSource] = {}
         self._watched: dict[Name, _Watched] = {}
         self._numbers = secrets.randbits(32) + 1
 
-    def hold(self, cameras: Mapping[Name, HeldCamera]) -> None:
-        """Set the cameras that displays may look at."""
-        self._held = dict(cameras)
+    def set_cameras(self, cameras: Mapping[Name, CameraSource]) -> None:
+        """Set the cameras that displays may show."""
+        self._sources = dict(cameras)
         for name, watched in list(self._watched.items()):
-            if self._held.get(name) != watched.camera:
+            if self._sources.get(name) != watched.camera:
                 self._forget(name)
 
-    def receive(self, client: Sender, look: Look | LookAway, now: float) -> None:
+    def receive(
+        self, client: Sender, request: CameraRequest | CameraRelease, now: float
+    ) -> None:
         """Process a message of a display about a camera.
 
         Raises:
-            WireError: If too many displays look at the camera.
+            WireError: If too many displays show the camera.
 
         """
-        name = (look.robot, look.camera)
-        if isinstance(look, LookAway):
-            self._look_away(name, client)
+        name = (request.robot, request.camera)
+        if isinstance(request, CameraRelease):
+            self._leave(name, client)
             return
-        camera = self._held.get(name)
+        camera = self._sources.get(name)
         if camera is None:
             text = "the agent has no such camera"
-            self._answer(client, Looked(look.number, now, text))
+            self._answer(client, CameraReply(request.number, now, text))
             return
         watched = self._watched.get(name)
         if watched is None:
             watched = self._watched[name] = _Watched(camera)
             self._begin(name, camera)
-        elif client not in watched.looks:
-            mine = [each for each in watched.looks if each.user == client.user]
+        elif client not in watched.requests:
+            mine = [each for each in watched.requests if each.user == client.user]
             if len(mine) >= MOST_DISPLAYS:
                 raise WireError(
                     f"more than {MOST_DISPLAYS} displays of the user {client.user} "
                     "look at one camera"
                 )
-        watched.looks[client] = now
-        self._answer(client, Looked(look.number, now, watched.trouble))
-        if any(number == look.newest for number, _ in watched.flying):
-            while watched.flying.popleft()[0] != look.newest:
+        watched.requests[client] = now
+        self._answer(client, CameraReply(request.number, now, watched.trouble))
+        if any(number == request.newest for number, _ in watched.flying):
+            while watched.flying.popleft()[0] != request.newest:
                 pass
         self._send_newest(name, watched, now)
 
@@ -164,23 +171,23 @@ class Cameras:
         self._send_newest(name, watched, now)
 
     def complain(self, name: Name, text: str) -> None:
-        """Note why no pictures come from a camera; displays read it after a look."""
+        """Note why no pictures come from a camera, for the next answers to displays."""
         watched = self._watched.get(name)
         if watched is not None:
             watched.trouble = text
 
-    def look(self, now: float) -> None:
-        """End the cameras that no display looks at any more."""
+    def check(self, now: float) -> None:
+        """End the cameras that no display shows any more."""
         for name, watched in list(self._watched.items()):
-            for client, at in list(watched.looks.items()):
-                if now - at > LOOKED:
-                    self._look_away(name, client)
+            for client, at in list(watched.requests.items()):
+                if now - at > EXPIRY:
+                    self._leave(name, client)
 
-    def _look_away(self, name: Name, client: Sender) -> None:
+    def _leave(self, name: Name, client: Sender) -> None:
         watched = self._watched.get(name)
-        if watched is None or watched.looks.pop(client, None) is None:
+        if watched is None or watched.requests.pop(client, None) is None:
             return
-        if not watched.looks:
+        if not watched.requests:
             self._forget(name)
 
     def _forget(self, name: Name) -> None:
@@ -197,7 +204,7 @@ class Cameras:
         watched.newest = None
         self._numbers += 1
         flying.append((self._numbers, now))
-        self._send(name, CameraPicture(self._numbers, came, data))
+        self._send(name, PictureMessage(self._numbers, came, data))
 
 
 class AgentCameras:
@@ -214,19 +221,20 @@ class AgentCameras:
         self._peer = peer
         self._loop: asyncio.AbstractEventLoop | None = None
         self._pulls: dict[Name, Pull] = {}
-        self._allowance = Allowance("looks at cameras")
-        self._cameras = Cameras(
+        self._receiver = Receiver("camera requests", self._receive)
+        self._cameras = CameraRelay(
             begin=self._begin, end=self._end, send=self._send, answer=self._answer
         )
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Begin to listen to displays; called in the loop's thread."""
         self._loop = loop
+        self._receiver.start(loop)
         every = address.EVERY
         self._peer.listen(
-            address.looks_in(self._agent, every, every),
-            self._arrived,
-            most=looks.MOST_OF_LOOK,
+            address.camera_in(self._agent, every, every),
+            self._receiver.receive,
+            most=camera_messages.MOST_REQUEST,
         )
 
     async def stop(self) -> None:
@@ -234,30 +242,18 @@ class AgentCameras:
         for pull in self._pulls.values():
             await pull.stop()
 
-    def hold(self, robots: Iterable[tuple[str, RobotConfig]]) -> None:
-        """Set the robots, with their ids, whose cameras displays may look at."""
-        self._cameras.hold(cameras_in(robots))
+    def set_cameras(self, robots: Iterable[tuple[str, RobotConfig]]) -> None:
+        """Set the robots, with their ids, whose cameras displays may show."""
+        self._cameras.set_cameras(cameras_of(robots))
 
-    def look(self, now: float) -> None:
-        """End the cameras that no display looks at any more."""
-        self._cameras.look(now)
+    def check(self, now: float) -> None:
+        """End the cameras that no display shows any more."""
+        self._cameras.check(now)
 
-    def _arrived(self, key: str, piece: bytes) -> None:
-        client = sender_of(key)
-        if (
-            self._loop is not None
-            and not self._loop.is_closed()
-            and self._allowance.admits(client.user, len(piece), time.monotonic())
-        ):
-            self._loop.call_soon_threadsafe(self._take, client, piece)
+    def _receive(self, client: Sender, piece: bytes, now: float) -> None:
+        self._cameras.receive(client, camera_messages.read_request(piece), now)
 
-    def _take(self, client: Sender, piece: bytes) -> None:
-        try:
-            self._cameras.receive(client, looks.read_look(piece), time.monotonic())
-        except WireError as error:
-            log.warning("display %s: %s", client.display, error)
-
-    def _begin(self, name: Name, camera: HeldCamera) -> None:
+    def _begin(self, name: Name, camera: CameraSource) -> None:
         assert self._loop is not None
         pull = self._pulls[name] = Pull(
             parse_address(camera.url),
@@ -270,10 +266,10 @@ class AgentCameras:
     def _end(self, name: Name) -> None:
         self._pulls.pop(name).hang_up()
 
-    def _send(self, name: Name, picture: CameraPicture) -> None:
+    def _send(self, name: Name, picture: PictureMessage) -> None:
         key = address.camera_key(self._agent, *name)
-        self._peer.put_data(key, looks.pack_picture(picture))
+        self._peer.put_data(key, camera_messages.pack_picture(picture))
 
-    def _answer(self, client: Sender, looked: Looked) -> None:
-        key = address.looks_out(self._agent, client.user, client.instance)
-        self._peer.put_data(key, msgspec.json.encode(looked), all=True)
+    def _answer(self, client: Sender, reply: CameraReply) -> None:
+        key = address.camera_out(self._agent, client.user, client.instance)
+        self._peer.put_data(key, msgspec.json.encode(reply), all=True)

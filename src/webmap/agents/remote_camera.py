@@ -15,17 +15,21 @@ from urllib.parse import parse_qs, urlencode, urlsplit
 
 import msgspec
 
-from webmap.agents import address, looks
-from webmap.agents.allowance import Allowance
-from webmap.agents.looks import AgentClock, Look, LookAway
+from webmap.agents import address, camera_messages
+from webmap.agents.camera_messages import (
+    AgentClock,
+    CameraRelease,
+    CameraRequest,
+)
 from webmap.agents.peer import Peer, peer_of
+from webmap.agents.rate_limit import UserRateLimit
 from webmap.base.errors import ConfigError, WireError
 from webmap.base.text import one_line
 
 log = logging.getLogger("webmap.agent")
 
 AGAIN = 1.0
-"""Seconds between two looks while no pictures come."""
+"""Seconds between two requests while no pictures come."""
 
 PATIENCE = 5.0
 """Seconds without any answer of the agent after which that is a problem."""
@@ -33,7 +37,7 @@ PATIENCE = 5.0
 _numbers = itertools.count(1)
 
 
-class FarCamera(NamedTuple):
+class RemoteCamera(NamedTuple):
     """Where a camera beside an agent is."""
 
     agent: str
@@ -66,13 +70,13 @@ class FarCamera(NamedTuple):
 
     @property
     def url(self) -> str:
-        """The camera in one address."""
+        """All fields in one address, which :meth:`parse` reads."""
         fields = {"robot": self.robot, "camera": self.camera, "place": self.place}
         return f"{self.agent}?{urlencode(fields)}"
 
     @property
     def name(self) -> str:
-        """The name of the agent."""
+        """The name of the agent, without its router."""
         return urlsplit(self.agent).path.strip("/")
 
     @property
@@ -81,8 +85,8 @@ class FarCamera(NamedTuple):
         return f"{self.place} through the agent {self.name}".strip()
 
 
-class FarPull:
-    """Looks at a camera beside an agent until it is stopped; a service of the process.
+class RemoteCameraPull:
+    """Gets the pictures of a camera beside an agent; a service of the process.
 
     Args:
         camera: Where the camera is.
@@ -93,7 +97,7 @@ class FarPull:
 
     def __init__(
         self,
-        camera: FarCamera,
+        camera: RemoteCamera,
         show: Callable[[bytes, float], None],
         complain: Callable[[str], None],
     ) -> None:
@@ -101,66 +105,68 @@ class FarPull:
         self._show = show
         self._complain = complain
         self._clock = AgentClock()
-        self._allowance = Allowance("pictures", pieces=200, size=32 << 20)
+        self._allowance = UserRateLimit("pictures", pieces=200, size=32 << 20)
         self._newest = 0
-        self._heard = 0.0
+        self._answered_at = 0.0
         self._peer: Peer | None = None
         self._listening: list[int] = []
         self._task: asyncio.Task[None] | None = None
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Begin to look at the camera."""
+        """Begin to request pictures."""
         agent, robot, camera = self._camera.name, *self._camera[1:3]
         self._peer = peer = peer_of(self._camera.agent)
         self._loop = loop
         user = peer.user
-        self._in = address.looks_in(agent, user.name, user.instance)
-        out = address.looks_out(agent, user.name, user.instance)
+        self._in = address.camera_in(agent, user.name, user.instance)
+        out = address.camera_out(agent, user.name, user.instance)
         self._listening = [
-            peer.listen(out, self._later(self._take_answer), most=looks.MOST_OF_LOOK),
+            peer.listen(
+                out, self._later(self._take_answer), most=camera_messages.MOST_REQUEST
+            ),
             peer.listen(
                 address.camera_key(agent, robot, camera),
                 self._later(self._take),
-                most=looks.MOST_PICTURE,
+                most=camera_messages.MOST_PICTURE,
             ),
         ]
-        self._heard = time.monotonic()
-        self._task = loop.create_task(self._look_on())
+        self._answered_at = time.monotonic()
+        self._task = loop.create_task(self._keep_requesting())
 
     async def stop(self) -> None:
-        """Look away."""
+        """Request no more pictures."""
         task = self._task
         self.hang_up()
         if task is not None:
             await asyncio.wait([task])
 
     def hang_up(self) -> None:
-        """Look away; the second call has no effect."""
+        """Request no more pictures; the second call has no effect."""
         task, self._task = self._task, None
         if task is None or self._peer is None:
             return
         task.cancel()
         for number in self._listening:
             self._peer.unlisten(number)
-        self._put(LookAway(self._camera.robot, self._camera.camera))
+        self._put(CameraRelease(self._camera.robot, self._camera.camera))
 
-    async def _look_on(self) -> None:
+    async def _keep_requesting(self) -> None:
         assert self._peer is not None
         while True:
-            self._look()
+            self._request()
             await asyncio.sleep(AGAIN)
-            if time.monotonic() - self._heard > PATIENCE:
+            if time.monotonic() - self._answered_at > PATIENCE:
                 self._complain(self._peer.trouble or "the agent does not answer")
 
-    def _look(self) -> None:
+    def _request(self) -> None:
         number = next(_numbers)
         self._clock.asked(number, time.monotonic())
         robot, camera = self._camera.robot, self._camera.camera
-        self._put(Look(number, robot, camera, self._newest))
+        self._put(CameraRequest(number, robot, camera, self._newest))
 
-    def _put(self, look: Look | LookAway) -> None:
+    def _put(self, message: CameraRequest | CameraRelease) -> None:
         assert self._peer is not None
-        self._peer.put_data(self._in, msgspec.json.encode(look), all=True)
+        self._peer.put_data(self._in, msgspec.json.encode(message), all=True)
 
     def _later(self, fn: Callable[[bytes], None]) -> Callable[[str, bytes], None]:
         """Return a function that calls ``fn`` in the model's thread."""
@@ -183,17 +189,17 @@ class FarPull:
             log.warning("%s: %s", self._camera.agent, error)
 
     def _take_answer(self, piece: bytes) -> None:
-        looked, now = looks.read_looked(piece), time.monotonic()
-        if self._clock.answered(looked.number, looked.clock, now):
-            self._heard = now
-            if looked.trouble:
-                self._complain(one_line(looked.trouble))
+        reply, now = camera_messages.read_reply(piece), time.monotonic()
+        if self._clock.answered(reply.number, reply.clock, now):
+            self._answered_at = now
+            if reply.trouble:
+                self._complain(one_line(reply.trouble))
 
     def _take(self, piece: bytes) -> None:
-        picture = looks.read_picture(piece)
+        picture = camera_messages.read_picture(piece)
         age = self._clock.age(picture.clock, time.monotonic())
         if age is None:  # it was sent for another display
             return
         self._newest = picture.number
-        self._look()
+        self._request()
         self._show(picture.data, age)

@@ -1,7 +1,8 @@
 """What displays and agents exchange about cameras. No I/O.
 
-A display looks at a camera again and again, and each look names the newest picture that
-it got. The agent answers each look to its sender, and sends a picture once to all.
+A display requests the pictures of a camera again and again, and each request names the
+newest picture that it got. The agent answers each request to its sender, and sends a
+picture once to all.
 """
 
 import struct
@@ -13,7 +14,7 @@ import msgspec
 from webmap.base.errors import WireError
 from webmap.ros.messages_image import MAX_BYTES
 
-MOST_OF_LOOK = 4096
+MOST_REQUEST = 4096
 """The longest message of a display about a camera, in bytes."""
 
 _head = struct.Struct("<Qd")
@@ -22,11 +23,11 @@ MOST_PICTURE = _head.size + MAX_BYTES
 """The longest message with a picture, in bytes."""
 
 
-class Look(msgspec.Struct, frozen=True, tag="look"):
+class CameraRequest(msgspec.Struct, frozen=True, tag="look"):
     """A display shows a camera and wants its pictures for the next seconds."""
 
     number: int
-    """Grows with each look of a display."""
+    """Grows with each request of a display."""
     robot: str
     """The id of the robot."""
     camera: str
@@ -35,26 +36,26 @@ class Look(msgspec.Struct, frozen=True, tag="look"):
     """The number of the newest picture that came; 0 before the first."""
 
 
-class LookAway(msgspec.Struct, frozen=True, tag="away"):
+class CameraRelease(msgspec.Struct, frozen=True, tag="away"):
     """A display does not show a camera any more."""
 
     robot: str
     camera: str
 
 
-class Looked(msgspec.Struct, frozen=True):
-    """The answer to a look."""
+class CameraReply(msgspec.Struct, frozen=True):
+    """The agent's answer to a :class:`CameraRequest`, sent to its display alone."""
 
     number: int
-    """The number of the look."""
+    """The number of the request."""
     clock: float
-    """The agent's clock when the look came, in seconds."""
+    """The agent's clock when the request came, in seconds."""
     trouble: str = ""
     """Why no pictures come from the camera."""
 
 
-class CameraPicture(NamedTuple):
-    """A picture of a camera."""
+class PictureMessage(NamedTuple):
+    """A picture as the camera sent it; it goes to all displays at once."""
 
     number: int
     clock: float
@@ -62,46 +63,46 @@ class CameraPicture(NamedTuple):
     data: bytes
 
 
-_look = msgspec.json.Decoder(Look | LookAway).decode
-_looked = msgspec.json.Decoder(Looked).decode
+_request = msgspec.json.Decoder(CameraRequest | CameraRelease).decode
+_reply = msgspec.json.Decoder(CameraReply).decode
 
 
-def read_look(piece: bytes) -> Look | LookAway:
+def read_request(piece: bytes) -> CameraRequest | CameraRelease:
     """Return the message of a display about a camera.
 
     Raises:
         WireError: If the bytes are nothing of the kind.
 
     """
-    if len(piece) > MOST_OF_LOOK:
-        raise WireError(f"got a look of {len(piece)} bytes, {MOST_OF_LOOK} at most")
+    if len(piece) > MOST_REQUEST:
+        raise WireError(f"got a request of {len(piece)} bytes, {MOST_REQUEST} at most")
     try:
-        look: Look | LookAway = _look(piece)
+        request: CameraRequest | CameraRelease = _request(piece)
     except ValueError as error:
-        raise WireError(f"got a look that cannot be read: {error}") from error
-    return look
+        raise WireError(f"got a request that cannot be read: {error}") from error
+    return request
 
 
-def read_looked(piece: bytes) -> Looked:
-    """Return the answer to a look.
+def read_reply(piece: bytes) -> CameraReply:
+    """Return the answer to a request.
 
     Raises:
         WireError: If the bytes are none.
 
     """
     try:
-        looked: Looked = _looked(piece)
+        reply: CameraReply = _reply(piece)
     except ValueError as error:
         raise WireError(f"got an answer that cannot be read: {error}") from error
-    return looked
+    return reply
 
 
-def pack_picture(picture: CameraPicture) -> bytes:
-    """Return the message with a picture."""
+def pack_picture(picture: PictureMessage) -> bytes:
+    """Return number and clock in 16 bytes, and then the picture as it came."""
     return _head.pack(picture.number, picture.clock) + picture.data
 
 
-def read_picture(piece: bytes) -> CameraPicture:
+def read_picture(piece: bytes) -> PictureMessage:
     """Return the picture in a message.
 
     Raises:
@@ -111,14 +112,14 @@ def read_picture(piece: bytes) -> CameraPicture:
     if len(piece) <= _head.size:
         raise WireError(f"got a picture of {len(piece)} bytes")
     number, clock = _head.unpack_from(piece)
-    return CameraPicture(number, clock, piece[_head.size :])
+    return PictureMessage(number, clock, piece[_head.size :])
 
 
 class AgentClock:
     """Computes how old at most a picture is, without a common clock.
 
-    The agent's clock was read between a look and its answer. So the oldest that a
-    picture can be follows from the latest look that could have found that clock.
+    The agent's clock was read between a request and its answer. So the oldest that a
+    picture can be follows from the latest request that could have found that clock.
     """
 
     KEPT = 30
@@ -130,13 +131,13 @@ class AgentClock:
         """How much the display's clock is ahead of the agent's at least, in seconds."""
 
     def asked(self, number: int, now: float) -> None:
-        """Note the time of a look."""
+        """Note the time of a request."""
         self._asked[number] = now
         if len(self._asked) > self.KEPT:
             del self._asked[next(iter(self._asked))]
 
     def answered(self, number: int, clock: float, now: float) -> bool:
-        """Note the agent's clock in the answer to a look; return whether it was asked.
+        """Note the agent's clock in an answer; return whether it was asked here.
 
         Answers of the same agent about other cameras come too.
         """

@@ -23,7 +23,7 @@ APART = "names must differ by more than case and Unicode form"
 GIVEN_ROLES: tuple[TopicRole, ...] = ("odometry", "velocity", "scan")
 """The roles in a value of ``--robot``."""
 
-WHERE: tuple[TopicRole, ...] = ("odometry", "pose")
+POSE_ROLES: tuple[TopicRole, ...] = ("odometry", "pose")
 
 _PART = re.compile(PARTS)
 
@@ -44,7 +44,7 @@ class Candidate(NamedTuple):
         mine, others = self.found, other.found
         return (
             mine.name == others.name
-            or _where(mine) in ({_where(others)} - {""})
+            or _pose_topic(mine) in ({_pose_topic(others)} - {""})
             or mine.topic("velocity") in ({others.topic("velocity")} - {""})
         )
 
@@ -91,12 +91,12 @@ def check_name(name: str, where: str) -> None:
         )
 
 
-def set_twice(name: str) -> ConfigError:
+def same_name_error(name: str) -> ConfigError:
     """Return the error for a ``--set`` that gives two robots the same name."""
     return ConfigError(f"--set: two robots would be called {name!r}; {APART}")
 
 
-def given_robots(texts: Iterable[str], bridges: Sequence["Bridge"]) -> list[Candidate]:
+def parse_robots(texts: Iterable[str], bridges: Sequence["Bridge"]) -> list[Candidate]:
     """Return the robots of ``--robot``.
 
     Args:
@@ -135,8 +135,8 @@ def _differ(robot: Candidate, other: Candidate, text: str) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Offer:
-    """The drawable topics of a robot of ``--robot``."""
+class DrawableTopics:
+    """What discovery adds to a robot of ``--robot``: its other topics."""
 
     found: FoundRobot | None
     """The same robot as discovery found it, if it did."""
@@ -145,7 +145,9 @@ class Offer:
     layers: Layers
 
 
-def offer(given: FoundRobot, topics: Mapping[str, str], findings: Findings) -> Offer:
+def drawable_topics(
+    given: FoundRobot, topics: Mapping[str, str], findings: Findings
+) -> DrawableTopics:
     """Return the drawable topics of a robot given with ``--robot``.
 
     Scans are only those that were given, so the result has none.
@@ -162,7 +164,7 @@ def offer(given: FoundRobot, topics: Mapping[str, str], findings: Findings) -> O
     if layers is None:
         layers = find_layers(topics, {*findings.layers, space})[space]
     kept = [[layer for layer in each if layer.kind != "scan"] for each in layers]
-    return Offer(found, space, Layers(*map(tuple, kept)))
+    return DrawableTopics(found, space, Layers(*map(tuple, kept)))
 
 
 def same_robot(given: FoundRobot, robots: Iterable[FoundRobot]) -> FoundRobot | None:
@@ -173,7 +175,7 @@ def same_robot(given: FoundRobot, robots: Iterable[FoundRobot]) -> FoundRobot | 
     """
     there = tuple(robots)
     for robot in there:
-        if _has(robot, WHERE, given.topic("odometry")) or _has(
+        if _has(robot, POSE_ROLES, given.topic("odometry")) or _has(
             robot, ("velocity",), given.topic("velocity")
         ):
             return robot
@@ -200,7 +202,7 @@ def _topics_of(given: FoundRobot) -> list[str]:
     return [given.topic(role) for role in GIVEN_ROLES if given.topic(role)]
 
 
-def _where(robot: FoundRobot) -> str:
+def _pose_topic(robot: FoundRobot) -> str:
     return robot.topic("odometry") or robot.topic("pose")
 
 

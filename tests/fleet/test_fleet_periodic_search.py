@@ -13,9 +13,13 @@ from webmap.base.lifecycle import Lifecycle
 from webmap.console import Console
 from webmap.discovery import discover
 from webmap.discovery.newcomers import News
-from webmap.fleet import watch as looking
-from webmap.fleet.shown import ShownRobots
-from webmap.fleet.watch import Looking, LookingForLayers, LookingForRobots
+from webmap.fleet import periodic_search as looking
+from webmap.fleet.periodic_search import (
+    LayerSearch,
+    PeriodicSearch,
+    RobotSearch,
+)
+from webmap.fleet.view_robots import ViewRobots
 
 URL = "ws://127.0.0.1:9"
 TOPICS = {"/bob/odom": "nav_msgs/Odometry", "/ann/odom": "nav_msgs/Odometry"}
@@ -47,7 +51,7 @@ class Open:
         return TOPICS
 
 
-class Failing(Looking):
+class Failing(PeriodicSearch):
     """A source that fails in the first looks."""
 
     period = 0.001
@@ -89,7 +93,7 @@ def test_a_new_robot_that_cannot_be_shown_does_not_hide_other_new_robots(caplog)
         shown.append(news.robot.namespace)
 
     async def scenario():
-        looks = LookingForRobots(Bridge(URL), [], came)
+        looks = RobotSearch(Bridge(URL), [], came)
         for _ in range(2):
             await looks.take(TOPICS)
 
@@ -100,9 +104,9 @@ def test_a_new_robot_that_cannot_be_shown_does_not_hide_other_new_robots(caplog)
 
 
 def test_new_robots_are_shown_even_if_standard_error_is_broken(nobody_hears):
-    bridge, late = Bridge(URL), ShownRobots(Console())
+    bridge, late = Bridge(URL), ViewRobots(Console())
     ann, bob = discover(TOPICS, "host").robots
-    came = late.came
+    came = late.show_news
     try:
         came(News(ann), bridge)
         came(News(bob), bridge)
@@ -113,13 +117,13 @@ def test_new_robots_are_shown_even_if_standard_error_is_broken(nobody_hears):
 
 
 def test_a_new_topic_that_fails_does_not_block_other_new_topics(caplog, capsys):
-    bridge, late = Bridge(URL), ShownRobots(Console())
+    bridge, late = Bridge(URL), ViewRobots(Console())
     odometry = {"/ann/odom": "nav_msgs/Odometry"}
     more = {
         "/ann/scan": "sensor_msgs/LaserScan",
         "/ann/battery_state": "sensor_msgs/BatteryState",
     }
-    came = late.came
+    came = late.show_news
     came(News(discover(odometry, "host").robots[0]), bridge)
     (robot,) = late.robots
 
@@ -139,13 +143,13 @@ def test_a_new_topic_that_fails_does_not_block_other_new_topics(caplog, capsys):
 
 
 def test_a_layer_that_fails_is_logged_once_and_does_not_block_other_layers(caplog):
-    bridge, late = Bridge(URL), ShownRobots(Console())
+    bridge, late = Bridge(URL), ViewRobots(Console())
     topics = {
         "/ann/odom": "nav_msgs/Odometry",
         "/ann/points": "sensor_msgs/PointCloud2",
         "/ann/sonar": "sensor_msgs/Range",
     }
-    late.came(News(discover(topics, "host").robots[0]), bridge)
+    late.show_news(News(discover(topics, "host").robots[0]), bridge)
     (robot,) = late.robots
 
     def failing(name, *args, **options):
@@ -154,7 +158,7 @@ def test_a_layer_that_fails_is_logged_once_and_does_not_block_other_layers(caplo
         return add(name, *args, **options)
 
     add, robot.add_module = robot.add_module, failing
-    looking = LookingForLayers(bridge, late)
+    looking = LayerSearch(bridge, late)
     try:
         for _ in range(2):
             asyncio.run(looking.take(topics))
@@ -167,13 +171,13 @@ def test_a_layer_that_fails_is_logged_once_and_does_not_block_other_layers(caplo
 
 def test_layers_are_drawn_even_if_the_notice_about_left_out_topics_fails(nobody_hears):
     many = {f"/ann/cloud{n}": "sensor_msgs/PointCloud2" for n in range(40)}
-    late = ShownRobots(Console())
+    late = ViewRobots(Console())
     bridge = Bridge(URL)
     topics = {"/ann/odom": "nav_msgs/Odometry", **many}
     (ann,) = discover(topics, "host").robots
-    late.came(News(ann), bridge)
+    late.show_news(News(ann), bridge)
     try:
-        drawn = LookingForLayers(bridge, late)
+        drawn = LayerSearch(bridge, late)
         asyncio.run(drawn.take(topics))
         assert any("cloud" in topic for topic in bridge._topics)
     finally:

@@ -11,17 +11,18 @@ from collections.abc import Callable
 import msgspec
 from msgspec.structs import replace
 
-from webmap.agents.displays import (
+from webmap.agents.gate_messages import (
     MOST_NAME,
     MOST_PAGES,
     AllReports,
-    Answer,
     FromDisplay,
-    Page,
+    Numbering,
+    Order,
+    PageState,
+    SampleAck,
+    StopAck,
     ToDisplays,
-    Took,
 )
-from webmap.agents.samples import Numbering, Order
 from webmap.base.errors import WireError
 from webmap.base.geometry import Twist
 from webmap.gate import commands, protocol
@@ -56,7 +57,7 @@ _decode = msgspec.msgpack.Decoder(ToDisplays).decode
 _encode = msgspec.msgpack.Encoder().encode
 
 
-class FarGate:
+class RemoteGate:
     """The gate of one agent, as a display knows it.
 
     Args:
@@ -93,7 +94,7 @@ class FarGate:
         self._numbering = Numbering()
         self._heard_at = float("-inf")
         self._robots: dict[str, str] = {}
-        """The names of the agent's robots by id: nothing else is heard of here."""
+        """The names of the agent's robots by id: no other robot is passed on."""
         self._pages: dict[str, protocol.Connect] = {}
         self._speeds: dict[str, tuple[float, float]] = {}
         self._greeted: set[str] = set()
@@ -122,7 +123,7 @@ class FarGate:
 
     @property
     def connection(self) -> str:
-        """The connection of the program of this display."""
+        """The identity at the agent's gate of this display's program."""
         return f"{self.display}/{protocol.PROGRAM}"
 
     def send(self, message: protocol.ToGate) -> None:
@@ -202,7 +203,7 @@ class FarGate:
                 self._begin(now)
             elif self._order.lost != lost:
                 self._lacks_reports = True
-            self._hear(message)
+            self._process(message)
             if self._asks_for_reports:
                 self._answer()
 
@@ -249,7 +250,7 @@ class FarGate:
         self._commanded_at = self._heard_at
 
     def _answer(
-        self, pages: tuple[Page, ...] | None = None, *, idle: bool = False
+        self, pages: tuple[PageState, ...] | None = None, *, idle: bool = False
     ) -> None:
         """Name the newest sample of the agent, if there was one.
 
@@ -261,15 +262,15 @@ class FarGate:
         asks = self._asks_for_reports
         if asks:
             self._asked_at = self._heard_at
-        answer = Answer(self._order.session, self._order.newest, pages, asks)
+        answer = SampleAck(self._order.session, self._order.newest, pages, asks)
         self._put(answer, only=self._numbering.sent if idle else None)
 
     def _list(self, *, idle: bool = False) -> None:
         """Send the agent the whole state of the pages and of the program."""
         self._changed = False
-        program = Page(protocol.PROGRAM, f"program of {self.display}", "operator")
+        program = PageState(protocol.PROGRAM, f"program of {self.display}", "operator")
         pages = [
-            Page(
+            PageState(
                 id.removeprefix(f"{self.display}/"),
                 page.name[:MOST_NAME],
                 page.role,
@@ -297,7 +298,7 @@ class FarGate:
             self._put(stop)
         self._owner.hear(protocol.Ready(0))
 
-    def _hear(self, message: ToDisplays) -> None:
+    def _process(self, message: ToDisplays) -> None:
         robot = getattr(message, "robot", None)
         if robot is not None and robot not in self._robots:
             return
@@ -307,7 +308,7 @@ class FarGate:
             case protocol.RefusedCount():
                 last = f"{message.by}: {message.last}"
                 message = replace(message, by=f"the agent {self.agent}", last=last)
-            case Took():
+            case StopAck():
                 if (message.display, message.session) == (
                     self.display,
                     self._numbering.session,
@@ -324,9 +325,9 @@ class FarGate:
             case AllReports(reports, robots):
                 self._lacks_reports, self._asked_at = False, float("-inf")
                 for robot in self._reported.difference(robots):
-                    self._hear(protocol.RobotGone(robot))
+                    self._process(protocol.RobotGone(robot))
                 for report in reports:
-                    self._hear(report)
+                    self._process(report)
                 return
             case protocol.RobotReport():
                 message = replace(message, name=self._robots[message.robot])

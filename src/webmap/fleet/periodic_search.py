@@ -18,13 +18,13 @@ from webmap.discovery.layers import role_of
 from webmap.discovery.newcomers import Newcomers, News, leads_further
 from webmap.discovery.robots import host_name
 from webmap.discovery.tf_robots import Trees
-from webmap.fleet.given import Offer, offer
 from webmap.fleet.overrides import MOST_CAMERAS
+from webmap.fleet.robot_options import DrawableTopics, drawable_topics
 from webmap.modules.declaration import declarations
 
 if TYPE_CHECKING:
     from webmap import Bridge
-    from webmap.fleet.shown import ShownRobot, ShownRobots
+    from webmap.fleet.view_robots import ViewRobot, ViewRobots
 
 log = logging.getLogger("webmap.cli")
 
@@ -39,7 +39,7 @@ LONGEST = 60.0
 """Seconds between two queries to a bridge that does not answer; each costs a call."""
 
 
-class Looking(ABC):
+class PeriodicSearch(ABC):
     """Queries the topics behind a bridge periodically; a service of the process.
 
     Args:
@@ -68,16 +68,16 @@ class Looking(ABC):
         """Process the types by topic."""
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Start the queries."""
-        self._task = loop.create_task(self._look_on())
+        """Start to query the bridge each time that :attr:`period` has passed."""
+        self._task = loop.create_task(self._keep_searching())
 
     async def stop(self) -> None:
-        """Stop the queries."""
+        """Stop the queries; a query that runs is cancelled."""
         if self._task is not None:
             self._task.cancel()
             await asyncio.wait([self._task])
 
-    async def _look_on(self) -> None:
+    async def _keep_searching(self) -> None:
         pause = self.period
         while True:
             if self.bridge.state != "open":
@@ -113,7 +113,7 @@ class Looking(ABC):
         return await self.bridge.topics()
 
 
-class LookingForRobots(Looking):
+class RobotSearch(PeriodicSearch):
     """Searches periodically for robots behind a bridge.
 
     It uses their topics and the frames received for a short time at each search.
@@ -121,7 +121,7 @@ class LookingForRobots(Looking):
     Args:
         bridge: The bridge.
         known: The robots that are shown already.
-        came: Called with the news.
+        on_news: Called with the news.
 
     """
 
@@ -131,11 +131,11 @@ class LookingForRobots(Looking):
         self,
         bridge: "Bridge",
         known: Iterable[FoundRobot],
-        came: Callable[[News, "Bridge"], object],
+        on_news: Callable[[News, "Bridge"], object],
     ) -> None:
         super().__init__(bridge)
         self._newcomers = Newcomers(known)
-        self._came = came
+        self._on_news = on_news
 
     async def take(self, topics: dict[str, str]) -> None:
         """Report new robots and new topics of robots."""
@@ -143,7 +143,7 @@ class LookingForRobots(Looking):
         found = await self._discover(topics, trees)
         for news in self._newcomers.look(found):
             try:
-                self._came(news, self.bridge)
+                self._on_news(news, self.bridge)
             except Exception:  # the other news is reported only once
                 log.exception(
                     "%s: the new topics of %s are not shown",
@@ -152,7 +152,7 @@ class LookingForRobots(Looking):
                 )
 
 
-class LookingForLayers(Looking):
+class LayerSearch(PeriodicSearch):
     """Searches periodically for topics to draw of the robots behind a bridge.
 
     Args:
@@ -166,15 +166,15 @@ class LookingForLayers(Looking):
     def __init__(
         self,
         bridge: "Bridge",
-        shown: "ShownRobots",
+        shown: "ViewRobots",
         *,
-        given: "Sequence[ShownRobot]" = (),
+        given: "Sequence[ViewRobot]" = (),
         topics: Mapping[str, str] | None = None,
     ) -> None:
         super().__init__(bridge, topics)
         self._shown = shown
         self._given = [robot for robot in given if robot.bridge is bridge]
-        self._placed: dict[ShownRobot, FoundRobot] = {}
+        self._placed: dict[ViewRobot, FoundRobot] = {}
         self._has_drawn = False
 
     @property
@@ -203,7 +203,7 @@ class LookingForLayers(Looking):
         """Draw the new topics of the robots given with ``--robot``."""
         taken: set[str] = set()
         for robot in self._given:
-            offered = offer(robot.found, topics, behind)
+            offered = drawable_topics(robot.found, topics, behind)
             if offered.namespace in taken:  # the topics of a namespace are drawn once
                 self._draw(robot, Layers(), offered.namespace)
                 continue
@@ -211,7 +211,7 @@ class LookingForLayers(Looking):
             self._place(robot, offered)
             self._draw(robot, offered.layers, offered.namespace)
 
-    def _place(self, robot: "ShownRobot", offered: Offer) -> None:
+    def _place(self, robot: "ViewRobot", offered: DrawableTopics) -> None:
         """Draw a robot in the frame of the map, like a found robot."""
         found, known = offered.found, self._placed.get(robot)
         if (
@@ -230,7 +230,7 @@ class LookingForLayers(Looking):
 
     def _draw(
         self,
-        robot: "ShownRobot",
+        robot: "ViewRobot",
         layers: Layers,
         namespace: str,
         cameras: Sequence[str] = (),
@@ -261,7 +261,7 @@ def on_page(layers: Layers, grid: bool) -> Layers:
     return Layers(tuple(drawn), layers.left_out)
 
 
-def _cameras_left_out(robot: "ShownRobot", found: FoundRobot) -> list[str]:
+def _cameras_left_out(robot: "ViewRobot", found: FoundRobot) -> list[str]:
     """Return the topics of cameras beyond the number that is shown."""
     shown = {camera.topic for camera in robot.config.cameras}
     if len(shown) < MOST_CAMERAS:

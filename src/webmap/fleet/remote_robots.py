@@ -14,7 +14,7 @@ import msgspec
 
 import webmap
 from webmap.agents import address
-from webmap.agents.description import (
+from webmap.agents.announcements import (
     MOST_GRIDS,
     MOST_OF_ABOUT,
     PROTOCOL,
@@ -38,7 +38,11 @@ from webmap.core.motion import agent_robot_id, id_at_agent, shown_name
 from webmap.core.pictures import pictures
 from webmap.core.robot import apply_config
 from webmap.core.runtime import runtime
-from webmap.fleet.passed_on import LARGEST, accepted, received_picture
+from webmap.fleet.robot_files import (
+    LARGEST,
+    config_from_agent,
+    picture_from_agent,
+)
 from webmap.poses.alignment import align_bridge
 
 if TYPE_CHECKING:
@@ -49,8 +53,8 @@ log = logging.getLogger("webmap.agent")
 FIRST = 1.5
 """Seconds for which a display listens for agents before it opens its page."""
 
-LOOK = 0.5
-"""Seconds between two looks at the signs of the agents."""
+CHECK = 0.5
+"""Seconds between two checks of the signs of the agents."""
 
 PICTURE_PATIENCE = 15.0
 """Seconds for the picture of a robot, which a slow link carries late."""
@@ -78,7 +82,7 @@ MOST_COMPLAINTS = 20
 
 
 @dataclass(eq=False)
-class _Shown:
+class _RemoteRobot:
     robot: "Robot"
     config: RobotConfig
     picture: PictureConfig | None = None
@@ -88,7 +92,7 @@ class _Shown:
 
 
 @dataclass(eq=False)
-class KnownAgent:
+class RemoteAgent:
     """An agent of which a display has heard."""
 
     name: str
@@ -96,7 +100,7 @@ class KnownAgent:
     beacon: Beacon
     about: str = ""
     """The description that is shown."""
-    robots: dict[str, _Shown] = field(default_factory=dict)
+    robots: dict[str, _RemoteRobot] = field(default_factory=dict)
     """The robots on the console, by their ids."""
     alignment: tuple[float, float, float] = (0.0, 0.0, 0.0)
     asked: deque[float] = field(default_factory=lambda: deque(maxlen=ASKED))
@@ -116,7 +120,7 @@ class KnownAgent:
         return True
 
 
-class Agents:
+class RemoteAgents:
     """Shows the robots of the agents of one router.
 
     Args:
@@ -132,20 +136,20 @@ class Agents:
         self._place = self.url if self.only is None else self.url.rpartition("/")[0]
         self._console: Console | None = None
         self._bridges: list[Bridge] = []
-        self._known: dict[str, KnownAgent] = {}
+        self._known: dict[str, RemoteAgent] = {}
         self._news: dict[str, Beacon] = {}
         self._news_at: dict[str, float] = {}
         """When the last sign of each agent came, on the monotonic clock."""
         self._task: asyncio.Task[None] | None = None
         self._peer = peer_of(router)
-        self._peer.listen(address.here(self.only or address.EVERY), self._heard)
+        self._peer.listen(address.beacon(self.only or address.EVERY), self._note_beacon)
         if self.only is not None:
             self._get(self.only, Beacon(PROTOCOL, "", ""))
         lifecycle.add(self)
 
     @property
-    def heard(self) -> bool:
-        """Whether a sign of an agent came."""
+    def has_agents(self) -> bool:
+        """Whether any agent of the router was there since the start."""
         return bool(self._news)
 
     @property
@@ -183,10 +187,10 @@ class Agents:
 
     def start(self, loop: asyncio.AbstractEventLoop) -> None:
         """Begin to show robots."""
-        self._task = loop.create_task(self._look_on())
+        self._task = loop.create_task(self._keep_checking())
 
     async def stop(self) -> None:
-        """Stop to show changes."""
+        """Stop to follow the agents; their robots stay on the console."""
         tasks = [self._task]
         for agent in self._known.values():
             tasks += [agent.describing, agent.drawing]
@@ -197,7 +201,7 @@ class Agents:
             await asyncio.wait(running)
         self._turn = asyncio.Lock()  # the next loop needs its own
 
-    def _heard(self, key: str, piece: bytes) -> None:
+    def _note_beacon(self, key: str, piece: bytes) -> None:
         beacon, name = read_beacon(piece), key.split("/")[1]
         if beacon is None or not address.NAME.fullmatch(name):
             return
@@ -205,17 +209,17 @@ class Agents:
             self._news[name] = beacon
             self._news_at[name] = time.monotonic()
 
-    def _get(self, name: str, beacon: Beacon) -> KnownAgent:
+    def _get(self, name: str, beacon: Beacon) -> RemoteAgent:
         agent = self._known.get(name)
         if agent is None:
             with no_scope():
                 bridge = webmap.Bridge(f"{self._place}/{name}", name=name)
-            agent = self._known[name] = KnownAgent(name, bridge, beacon)
+            agent = self._known[name] = RemoteAgent(name, bridge, beacon)
             self._bridges.append(bridge)
         agent.beacon = beacon
         return agent
 
-    async def _look_on(self) -> None:
+    async def _keep_checking(self) -> None:
         while True:
             for name, beacon in list(self._news.items()):
                 agent = self._get(name, beacon)
@@ -228,9 +232,9 @@ class Agents:
                     agent.describing = spawn(self._describe(agent, self._console))
                 if agent.drawing is None and _undrawn(agent):
                     agent.drawing = spawn(self._draw(agent))
-            await asyncio.sleep(LOOK)
+            await asyncio.sleep(CHECK)
 
-    async def _describe(self, agent: KnownAgent, console: Console) -> None:
+    async def _describe(self, agent: RemoteAgent, console: Console) -> None:
         """Ask an agent for its description, and show its robots."""
         beacon = agent.beacon
         try:
@@ -254,13 +258,13 @@ class Agents:
             agent.describing = None
         agent.about = beacon.about
 
-    def _complain(self, agent: KnownAgent, text: str) -> None:
+    def _complain(self, agent: RemoteAgent, text: str) -> None:
         if text not in agent.complaints and len(agent.complaints) < MOST_COMPLAINTS:
             agent.complaints.add(text)
             log.error("%s", text)
             runtime.notice(f"{text[0].upper()}{text[1:]}.")
 
-    async def _apply(self, agent: KnownAgent, answer: bytes, console: Console) -> None:
+    async def _apply(self, agent: RemoteAgent, answer: bytes, console: Console) -> None:
         """Show the described robots, one after the other."""
         about, robots, mistakes = await asyncio.to_thread(read_about, answer)
         for text in mistakes:
@@ -302,13 +306,13 @@ class Agents:
 
     def _show(
         self,
-        agent: KnownAgent,
+        agent: RemoteAgent,
         id: str,
         given: RobotConfig,
         bridges: "dict[str, Bridge]",
         console: Console,
     ) -> None:
-        config, picture = accepted(given, agent.bridge.url, id, bridges)
+        config, picture = config_from_agent(given, agent.bridge.url, id, bridges)
         shown = agent.robots.get(id)
         if shown is not None:
             shown.picture = picture
@@ -328,11 +332,11 @@ class Agents:
                 robot = make_robot(config, bridges)
         finally:
             agent_robot_id.reset(token)
-        agent.robots[id] = _Shown(robot, config, picture)
+        agent.robots[id] = _RemoteRobot(robot, config, picture)
         console.add(robot)
         notify(f"{robot.name} is a robot of the agent {agent.name}")
 
-    async def _draw(self, agent: KnownAgent) -> None:
+    async def _draw(self, agent: RemoteAgent) -> None:
         """Draw the robots of an agent as their pictures, which the agent has."""
         try:
             for shown in _undrawn(agent):
@@ -350,7 +354,7 @@ class Agents:
         finally:
             agent.drawing = None
 
-    async def _get_picture(self, agent: KnownAgent, name: str) -> bool:
+    async def _get_picture(self, agent: RemoteAgent, name: str) -> bool:
         """Publish a picture of an agent; return whether it is one."""
         if name not in agent.pictures:
             key = address.about_picture(agent.name, name)
@@ -362,7 +366,7 @@ class Agents:
                 if answer is None:
                     await asyncio.sleep(PICTURE_AGAIN)
                     return False
-                found = await asyncio.to_thread(received_picture, name, answer)
+                found = await asyncio.to_thread(picture_from_agent, name, answer)
                 agent.pictures[name] = pictures.publish(*found)
             except WebMapError as error:
                 agent.pictures[name] = ""
@@ -372,7 +376,7 @@ class Agents:
         return agent.pictures[name] != ""
 
 
-def _undrawn(agent: KnownAgent) -> list[_Shown]:
+def _undrawn(agent: RemoteAgent) -> list[_RemoteRobot]:
     """Return the robots that are drawn otherwise than their agent has them."""
     return [
         each
@@ -382,7 +386,7 @@ def _undrawn(agent: KnownAgent) -> list[_Shown]:
     ]
 
 
-def find_agents(routers: Sequence[str], bridges: "list[Bridge]") -> list[Agents]:
+def find_agents(routers: Sequence[str], bridges: "list[Bridge]") -> list[RemoteAgents]:
     """Return the agents of routers, after a moment in which those there are heard.
 
     Args:
@@ -390,7 +394,7 @@ def find_agents(routers: Sequence[str], bridges: "list[Bridge]") -> list[Agents]
         bridges: Gets the bridges of the agents, also of those that come later.
 
     """
-    found = [Agents(router) for router in routers]
+    found = [RemoteAgents(router) for router in routers]
     until = time.monotonic() + FIRST
     while found and time.monotonic() < until:
         time.sleep(0.05)
@@ -398,7 +402,7 @@ def find_agents(routers: Sequence[str], bridges: "list[Bridge]") -> list[Agents]
         each.join(bridges)
         if each.trouble is not None:
             echo(f"{each.trouble}. Its robots appear when it is there.", err=True)
-        elif not each.heard:
+        elif not each.has_agents:
             text = each.describe()[1]
             text = f"{text[0].upper()}{text[1:]}. Robots appear when one is there."
             echo(text, err=True)

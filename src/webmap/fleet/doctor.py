@@ -64,7 +64,7 @@ def _always(robots: Sequence[ConfiguredRobot]) -> Configured:
 
 def _of_file(file: Path) -> list[tuple[str, Configured]]:
     from webmap.features.doctor.in_use import Made, in_use
-    from webmap.fleet.made import prepare
+    from webmap.fleet.fleet_file import prepare
 
     ready = prepare(file)
     maps: list[Made] = []
@@ -84,15 +84,15 @@ def _with_options(
     url: str, robots: Sequence[str], settings: Sequence[str]
 ) -> Configured:
     import webmap
-    from webmap.fleet.given import given_robots
     from webmap.fleet.overrides import Overrides, parse_setting
+    from webmap.fleet.robot_options import parse_robots
 
     overrides = Overrides([parse_setting(text) for text in settings])
-    given = given_robots(robots, [webmap.Bridge(url)])
+    given = parse_robots(robots, [webmap.Bridge(url)])
     if given:
         overrides.check([robot.found.name for robot in given], all_known=True)
         return _always(
-            [_from_given(robot) for _, robot in overrides.apply_to_given(given)]
+            [_from_given(robot) for _, robot in overrides.apply_to_options(given)]
         )
 
     def overridden(found: Findings) -> Sequence[ConfiguredRobot]:

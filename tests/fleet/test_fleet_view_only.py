@@ -5,8 +5,8 @@ from webmap.config.motion import MotionConfig
 from webmap.console import Console
 from webmap.discovery import discover
 from webmap.discovery.newcomers import News
-from webmap.fleet.overrides import MOTION, Watched
-from webmap.fleet.shown import ShownRobots
+from webmap.fleet.overrides import MOTION, ViewOnly
+from webmap.fleet.view_robots import ViewRobots
 
 URL = "ws://127.0.0.1:9090"
 SEEN = {
@@ -26,15 +26,15 @@ TOPICS = SEEN | {
 def test_a_robot_of_a_recording_gets_no_motion_settings():
     (found,) = discover(TOPICS, "robot").robots
     assert {"velocity", "goal", "action", "initialpose"} <= set(found.guesses)
-    watched = Watched("office")
+    watched = ViewOnly("office")
     config = watched.config(URL, watched.apply(URL, found))
     assert (config.odometry.topic, config.scan) == ("/odom", ["/scan"])
     assert config.motion == MotionConfig()
 
 
 def test_topics_that_appear_later_give_a_recorded_robot_no_motion_settings():
-    bridge, late = Bridge(URL), ShownRobots(Console(), Watched("office"))
-    came = late.came
+    bridge, late = Bridge(URL), ViewRobots(Console(), ViewOnly("office"))
+    came = late.show_news
     (bare,) = discover(SEEN, "robot").robots
     came(News(bare), bridge)
     (whole,) = discover(TOPICS, "robot").robots
@@ -51,5 +51,5 @@ def test_a_recorded_robot_without_namespace_is_named_after_the_recording():
     for prefix in ("", "/bob"):
         topics = {f"{prefix}{topic}": type for topic, type in SEEN.items()}
         (found,) = discover(topics, "robot").robots
-        names[prefix] = Watched("office").apply(URL, found).name
+        names[prefix] = ViewOnly("office").apply(URL, found).name
     assert names == {"": "office", "/bob": "bob"}

@@ -13,19 +13,18 @@ from webmap.cli.view import view
 from webmap.console import Console, make_robot
 from webmap.discovery import FoundRobot, Guess, discover
 from webmap.features.layers.on_maps import OnMaps
-from webmap.fleet import found as found_fleet
-from webmap.fleet.find import Found
-from webmap.fleet.found import FoundFleet
-from webmap.fleet.given import (
+from webmap.fleet import search as found_fleet
+from webmap.fleet.periodic_search import LayerSearch
+from webmap.fleet.robot_options import (
     Candidate,
-    given_robots,
+    drawable_topics,
     namespace_of,
-    offer,
     parse_robot,
+    parse_robots,
     same_robot,
 )
-from webmap.fleet.shown import ShownRobot, ShownRobots
-from webmap.fleet.watch import LookingForLayers
+from webmap.fleet.search import FleetSearch, SearchResult
+from webmap.fleet.view_robots import ViewRobot, ViewRobots
 
 URL = "ws://bob:9090"
 GRID = "nav_msgs/OccupancyGrid"
@@ -63,10 +62,10 @@ def drawn(bridge, topics, *given):
     """Draw the given robots of a bridge; return the console."""
     console = Console([made(about) for about in given])
     known = [
-        ShownRobot(*about, robot, about.found.config(about.bridge.url))
+        ViewRobot(*about, robot, about.found.config(about.bridge.url))
         for about, robot in zip(given, console.given, strict=True)
     ]
-    layers = LookingForLayers(bridge, ShownRobots(console), given=known)
+    layers = LayerSearch(bridge, ViewRobots(console), given=known)
     asyncio.run(layers.take(topics))
     return console
 
@@ -116,7 +115,7 @@ def test_only_given_draws_no_layers_besides_the_given_topics(
 
     monkeypatch.setattr(webmap.console, "open_console", open_console)
     monkeypatch.setattr(webmap, "run", lambda **options: None)
-    monkeypatch.setattr(found_fleet, "LookingForLayers", looking)
+    monkeypatch.setattr(found_fleet, "LayerSearch", looking)
     done = CliRunner().invoke(view, [URL, "--robot", "Bob:/a/odom", *said])
     assert (done.exit_code, asked) == (0, drawn_of)
 
@@ -135,7 +134,7 @@ def test_a_robot_option_with_odometry_is_drawn_in_the_map_frame(bridge):
 def test_a_robot_option_unknown_to_discovery_gets_the_layers_of_its_namespace(bridge):
     topics = TOPICS | {"/c/where": "geometry_msgs/Pose", "/c/plan": "nav_msgs/Path"}
     given = described(bridge, odometry="/c/where")
-    assert offer(given.found, topics, discover(topics)).found is None
+    assert drawable_topics(given.found, topics, discover(topics)).found is None
     console = drawn(bridge, topics, given)
     assert what_of(console.given[0]) == [("Path", "/c/plan")]
     console.given[0].destroy()
@@ -150,8 +149,8 @@ def test_only_the_first_robot_option_in_a_namespace_gets_its_layers(bridge):
     assert [names.count("Trail") for names in made] == [1, 1], (
         "each robot has its own trail"
     )
-    behind = {bridge: Found(URL, "bob", discover(TOPICS), topics=TOPICS)}
-    fleet = FoundFleet([first, second], behind=behind)
+    behind = {bridge: SearchResult(URL, "bob", discover(TOPICS), topics=TOPICS)}
+    fleet = FleetSearch([first, second], behind=behind)
     assert fleet.table(grid=True, only_given=False).count("/a/points") == 1
     for robot in console.given:
         robot.destroy()
@@ -214,15 +213,15 @@ def test_the_namespace_of_a_robot_option_is_the_common_prefix_of_its_topics(
 )
 def test_an_invalid_robot_option_is_refused_with_its_text(bridge, texts, expected):
     with pytest.raises(ConfigError) as refused:
-        given_robots(texts, [bridge])
+        parse_robots(texts, [bridge])
     assert expected in str(refused.value)
 
 
 def test_two_robots_with_equal_topics_on_different_bridges_are_accepted(bridge):
     bridges = [bridge, Bridge("ws://al:9090")]
-    given = given_robots(["Bob:/odom:/cmd_vel", "2@Al:/odom:/cmd_vel"], bridges)
+    given = parse_robots(["Bob:/odom:/cmd_vel", "2@Al:/odom:/cmd_vel"], bridges)
     assert [robot.found.name for robot in given] == ["Bob", "Al"]
-    assert given_robots(["Bob:/a", "Al:/b"], [bridge])[1].found.topic("velocity") == ""
+    assert parse_robots(["Bob:/a", "Al:/b"], [bridge])[1].found.topic("velocity") == ""
 
 
 @pytest.mark.parametrize("number", ["nan", "inf", "-1", "x"])

@@ -6,20 +6,20 @@ import msgspec
 import pytest
 from PIL import Image
 
-from webmap.agents.far_camera import FarCamera
+from webmap.agents.remote_camera import RemoteCamera
 from webmap.base.errors import ConfigError, WireError
 from webmap.config.robot import PictureConfig, RobotConfig
 from webmap.core.registry import map_modules, robot_modules
-from webmap.fleet import passed_on as passed
-from webmap.fleet.held import held_in_file
-from webmap.fleet.passed_on import (
+from webmap.fleet import robot_files as passed
+from webmap.fleet.agent_robots import robots_in_file
+from webmap.fleet.robot_files import (
     LARGEST,
     OPENING,
-    accepted,
-    actions,
+    button_actions,
     check_parameters,
-    is_served,
-    passed_on,
+    config_for_displays,
+    config_from_agent,
+    is_picture_name,
 )
 
 AGENT = "zenoh://hall/bay3"
@@ -58,7 +58,7 @@ def read(tmp_path):
     def read_(text):
         file = tmp_path / "bay3.toml"
         file.write_text(text)
-        return held_in_file(file)
+        return robots_in_file(file)
 
     return read_
 
@@ -68,12 +68,12 @@ def test_an_agent_has_the_pictures_of_its_robots_by_names_without_paths(read, na
     held = read(HEAD + ROBOT + PICTURE.replace("FILE", name))
     (robot,) = held.robots()
     served = robot.config.picture.file
-    assert is_served(served)
+    assert is_picture_name(served)
     assert served.endswith(name[-4:].lower())
-    assert passed_on(robot.config).picture == robot.config.picture
-    shown, picture = accepted(robot.config, AGENT, robot.id, {"forklift"})
+    assert config_for_displays(robot.config).picture == robot.config.picture
+    shown, picture = config_from_agent(robot.config, AGENT, robot.id, {"forklift"})
     assert (shown.picture, picture) == (None, robot.config.picture)
-    data, media_type = passed.received_picture(served, held.pictures[served])
+    data, media_type = passed.picture_from_agent(served, held.pictures[served])
     assert data == held.pictures[served]
     assert media_type.startswith("image/")
 
@@ -110,9 +110,9 @@ def test_a_picture_that_a_display_would_not_show_is_refused_by_the_agent(
     ],
 )
 def test_a_display_checks_the_picture_that_an_agent_gives(name, data):
-    assert is_served(name)
+    assert is_picture_name(name)
     with pytest.raises(ConfigError):
-        passed.received_picture(name, data)
+        passed.picture_from_agent(name, data)
 
 
 @pytest.mark.parametrize(
@@ -158,7 +158,7 @@ def test_what_an_agent_does_not_pass_on_is_a_mistake_in_its_file(
 
 def test_displays_get_the_address_of_a_camera_without_secrets():
     given = {"name": "Bob", "cameras": [URL, {"topic": "/cam"}]}
-    config = passed_on(RobotConfig.from_dict(given))
+    config = config_for_displays(RobotConfig.from_dict(given))
     assert [(each.url, each.topic, each.name) for each in config.cameras] == [
         ("http://cam:8080/stream", "", "Camera 1"),
         ("", "/cam", "Camera 2"),
@@ -169,9 +169,9 @@ def test_displays_get_the_address_of_a_camera_without_secrets():
 
 def test_a_display_takes_the_cameras_of_an_agent_through_the_agent():
     given = {"name": "Bob", "bridge": "b", "cameras": [URL, "/cam"]}
-    config, _ = accepted(RobotConfig.from_dict(given), AGENT, "r1", {"b"})
+    config, _ = config_from_agent(RobotConfig.from_dict(given), AGENT, "r1", {"b"})
     http, topic = config.cameras
-    assert FarCamera.parse(http.url)[:3] == (AGENT, "r1", "Camera 1")
+    assert RemoteCamera.parse(http.url)[:3] == (AGENT, "r1", "Camera 1")
     assert topic.topic == "/cam"
 
 
@@ -202,7 +202,7 @@ def test_a_display_takes_the_cameras_of_an_agent_through_the_agent():
 def test_a_display_opens_nothing_that_an_agent_names(more, words):
     config = RobotConfig.from_dict({"name": "Bob", "bridge": "b", **more})
     with pytest.raises(ConfigError, match=words):
-        accepted(config, AGENT, "r1", {"b"})
+        config_from_agent(config, AGENT, "r1", {"b"})
 
 
 def test_every_module_that_is_given_a_file_or_an_address_is_known():
@@ -221,7 +221,9 @@ def test_a_picture_and_its_place_on_the_robot_are_kept():
     given = RobotConfig.from_dict(
         msgspec.json.decode(msgspec.json.encode(config.to_dict()))
     )
-    assert accepted(passed_on(given), AGENT, "r1", {"b"})[1] == picture
+    assert (
+        config_from_agent(config_for_displays(given), AGENT, "r1", {"b"})[1] == picture
+    )
 
 
 BUTTONS = [
@@ -250,7 +252,9 @@ ROS2 = "/eve/base/set_parameters"
     ],
 )
 def test_displays_may_write_what_any_button_of_the_agent_writes(config):
-    found = actions(RobotConfig.from_dict({"name": "Eve", "bridge": "b", **config}))
+    found = button_actions(
+        RobotConfig.from_dict({"name": "Eve", "bridge": "b", **config})
+    )
     assert [each.get("topic") or each["service"] for each in found] == [
         "/eve/dock",
         "/eve/lamp",

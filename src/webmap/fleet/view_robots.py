@@ -21,8 +21,8 @@ from webmap.discovery.findings import FoundLayer, TopicRole, free_name
 from webmap.discovery.layers import TRAIL, drawing, topic_of, with_layers
 from webmap.discovery.newcomers import News
 from webmap.discovery.tables import summary_line
-from webmap.fleet.given import Candidate
 from webmap.fleet.overrides import Overrides, shared_map
+from webmap.fleet.robot_options import Candidate
 
 if TYPE_CHECKING:
     from webmap import Bridge, Robot
@@ -46,12 +46,12 @@ PARTS: Mapping[TopicRole, str] = {
 
 
 def whole(config: RobotConfig) -> RobotConfig:
-    """Return a configuration as it is."""
+    """Return ``config``: a robot with a page is made of all its parts."""
     return config
 
 
 @dataclass(slots=True, eq=False)
-class ShownRobot:
+class ViewRobot:
     """A robot that is shown, found or given with ``--robot``."""
 
     bridge: "Bridge"
@@ -63,14 +63,14 @@ class ShownRobot:
     topics: set[str] = field(default_factory=set)
     """Topics that are drawn, or that were reported as not drawn."""
 
-    made_of: Callable[[RobotConfig], RobotConfig] = whole
+    part_of: Callable[[RobotConfig], RobotConfig] = whole
     """Returns the part of a configuration that the robot is made of here."""
 
     def change(self, config: RobotConfig) -> Mistakes:
         """Configure the parts of the robot that differ; return the mistakes."""
-        old, self.config = self.made_of(self.config), config
+        old, self.config = self.part_of(self.config), config
         with no_scope():
-            new = self.made_of(config)
+            new = self.part_of(config)
             return apply_config(self.robot, old, new, {self.bridge.url: self.bridge})
 
     def use(self, config: RobotConfig) -> set[Any]:
@@ -115,7 +115,7 @@ class ShownRobot:
         return f"{self.robot.name} now {changes}" if changes else ""
 
 
-class ShownRobots:
+class ViewRobots:
     """Makes and shows robots when they are found.
 
     Args:
@@ -123,7 +123,7 @@ class ShownRobots:
         overrides: Settings that replace guesses.
         given: Robots given with ``--robot``; each replaces the found robot.
         grid: Whether the robots' own maps are shown under them.
-        made_of: Returns the part of a configuration that a robot is made of here.
+        part_of: Returns the part of a configuration that a robot is made of here.
 
     """
 
@@ -134,27 +134,27 @@ class ShownRobots:
         *,
         given: Sequence[Candidate] = (),
         grid: bool = True,
-        made_of: Callable[[RobotConfig], RobotConfig] = whole,
+        part_of: Callable[[RobotConfig], RobotConfig] = whole,
     ) -> None:
-        self._made_of = made_of
+        self._part_of = part_of
         self.overrides = overrides or Overrides()
         self.grid = grid
         self._console = console
         self._given = given
         self._names = {same_name(robot.found.name) for robot in given}
-        self._places: dict[tuple[Bridge, str], ShownRobot] = {}
+        self._places: dict[tuple[Bridge, str], ViewRobot] = {}
 
     @property
     def robots(self) -> "list[Robot]":
-        """The robots that were made."""
+        """The robots on the console, in the order in which they were found."""
         return [shown.robot for shown in self._places.values()]
 
     @property
-    def shown(self) -> list[ShownRobot]:
+    def shown(self) -> list[ViewRobot]:
         """The robots that were made, with their configurations."""
         return list(self._places.values())
 
-    def get(self, bridge: "Bridge", namespace: str) -> ShownRobot | None:
+    def get(self, bridge: "Bridge", namespace: str) -> ViewRobot | None:
         """Return the robot that was found in a namespace behind a bridge."""
         return self._places.get((bridge, namespace))
 
@@ -165,13 +165,13 @@ class ShownRobots:
         self._names.add(same_name(found.name))
         config = self.overrides.config(bridge.url, found)
         with no_scope():
-            made = make_robot(self._made_of(config), [bridge])
+            made = make_robot(self._part_of(config), [bridge])
             store.restore(made)
-        shown = ShownRobot(bridge, found, made, config, made_of=self._made_of)
+        shown = ViewRobot(bridge, found, made, config, part_of=self._part_of)
         self._places[bridge, found.namespace] = shown
         self._console.add(made)
 
-    def came(self, news: News, bridge: "Bridge") -> None:
+    def show_news(self, news: News, bridge: "Bridge") -> None:
         """Show news, and report it on standard error.
 
         If the name of a new robot is taken, the name of its bridge is added. A robot
@@ -200,7 +200,7 @@ class ShownRobots:
         notify(f"A robot appeared behind {bridge.url}: {summary_line(named)}")
 
     def draw(
-        self, shown: ShownRobot, layers: Iterable[FoundLayer], namespace: str
+        self, shown: ViewRobot, layers: Iterable[FoundLayer], namespace: str
     ) -> None:
         """Draw the new topics of a robot, and its trail.
 
@@ -247,7 +247,7 @@ class ShownRobots:
         if self.grid and topic:
             self._console.add_grid(robot.bridge, topic)
 
-    def _update(self, shown: ShownRobot, found: FoundRobot, news: News) -> list[str]:
+    def _update(self, shown: ViewRobot, found: FoundRobot, news: News) -> list[str]:
         """Change a robot by its newest findings, and return sentences about the news.
 
         A topic that is already drawn as a layer is not drawn again. Everything else

@@ -1,43 +1,43 @@
-"""Robots, maps and modules of a fleet file: made, checked and shown."""
+"""A fleet file: its bridges, robots, maps and modules are made, checked and shown."""
 
 import logging
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import msgspec
+
 import webmap
 from webmap import console
 from webmap.base.errors import ConfigError, WebMapError
+from webmap.base.geometry import LocalPlane
 from webmap.base.map_file import read_map
 from webmap.config.checks import KeyPath, Mistakes, WrongConfig
-from webmap.config.fleet import FleetConfig, read_fleet
-from webmap.config.robot import MOTION, ModuleConfig, RobotConfig
+from webmap.config.fleet import FleetConfig, ImageConfig, TilesConfig, read_fleet
+from webmap.config.robot import MOTION, ModuleConfig, PictureConfig, RobotConfig
 from webmap.config.toml_text import read_text, readable_secret
 from webmap.core.alignment_store import store
 from webmap.core.module_arguments import WrongArguments, check_arguments
+from webmap.core.pictures import pictures
 from webmap.core.registry import map_modules
 from webmap.core.robot import module_call, wrong_argument
-from webmap.fleet.files import (
-    check_floor,
-    check_images,
-    label_options,
-    publish_picture,
-    tile_options,
-)
-from webmap.fleet.of_agents import find_agents
+from webmap.features.labels.label_store import label_file, read_labels
+from webmap.features.tiles.tile_source import open_tiles
+from webmap.fleet.remote_robots import find_agents
+from webmap.fleet.robot_files import picture_file
 from webmap.poses.alignment import align_bridge
 from webmap.ros.names import is_agent_url
 
 if TYPE_CHECKING:
     from webmap import Bridge, Robot
 
-
 log = logging.getLogger("webmap.cli")
 
 
 class MapModule(NamedTuple):
-    """A module of the map, with its arguments."""
+    """A module of the key ``modules``, with the arguments of its constructor."""
 
     name: str
     args: tuple[Any, ...]
@@ -248,3 +248,121 @@ def restore(robots: "list[Robot]") -> None:
     """Restore alignments that people set on a page, unless the file has newer ones."""
     for robot in robots:
         store.restore(robot)
+
+
+PICTURES = (".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".svg", ".tif", ".tiff")
+"""Suffixes of pictures; such a file in place of a YAML file is a common mistake."""
+
+NEEDED = ("name", "x", "y")
+"""The required keys of a label."""
+
+
+def check_floor(floor: Path, mistakes: Mistakes) -> None:
+    """Note the mistakes of a floor plan."""
+    from webmap.console.floor import load_floor
+
+    if floor.suffix.lower() in PICTURES:
+        mistakes.add(
+            ("floor",),
+            f"got the picture {str(floor)!r}, expected the YAML file that names it and "
+            "its position",
+        )
+        return
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            load_floor(floor, Path(folder))
+    except (ConfigError, OSError) as error:
+        mistakes.add(("floor",), str(error))
+
+
+def check_images(
+    images: Sequence[ImageConfig], folder: Path, mistakes: Mistakes
+) -> list[tuple[str, float, float, float, float]]:
+    """Return pictures as ``Map.add_image`` takes them; note files that are none."""
+    found = []
+    for index, image in enumerate(images):
+        file = folder / image.file
+        try:
+            picture_file(file)
+        except (ConfigError, OSError) as error:
+            mistakes.add(("image", index, "file"), str(error))
+            continue
+        sides = (image.x, image.y, image.width, image.height)
+        found.append((str(file.absolute()), *sides))
+    return found
+
+
+def publish_picture(
+    picture: PictureConfig, folder: Path, path: KeyPath, mistakes: Mistakes
+) -> str:
+    """Return the URL from which pages load the picture of a robot.
+
+    Args:
+        picture: The picture.
+        folder: Folder to which its file is relative.
+        path: The keys that lead to it.
+        mistakes: Receives the mistakes; there is no URL then.
+
+    """
+    try:
+        data, media_type = picture_file(folder / picture.file)
+    except (ConfigError, OSError) as error:
+        mistakes.add((*path, "file"), str(error))
+        return ""
+    return pictures.publish(data, media_type)
+
+
+def label_options(places: Any, folder: Path, mistakes: Mistakes) -> dict[str, Any]:
+    """Return the arguments of ``Labels``; note the mistakes.
+
+    Args:
+        places: Tables of labels, or the name of a file with them.
+        folder: Folder to which the file is relative.
+        mistakes: Receives the mistakes.
+
+    """
+    if not isinstance(places, str):
+        for index, each in enumerate(places):
+            _check_label(each, ("labels", index), mistakes)
+        return {"labels": places}
+    file = folder / places
+    try:
+        label_file(file)
+    except ConfigError as error:
+        mistakes.add(("labels",), str(error))
+    return {"file": str(file.absolute())}
+
+
+def _check_label(label: Any, path: KeyPath, mistakes: Mistakes) -> None:
+    there = label if isinstance(label, dict) else NEEDED
+    missing = [key for key in NEEDED if key not in there]
+    for key in missing:
+        mistakes.add(path, f'the key "{key}" is missing')
+    if missing:
+        return
+    try:
+        read_labels([label], "")
+    except ConfigError as error:
+        # The label was read as item 0 of a list; its index in the file may differ.
+        _, *inner = getattr(error, "path", (0,))
+        mistakes.add((*path, *inner), getattr(error, "text", str(error)))
+
+
+def tile_options(
+    tiles: TilesConfig, folder: Path, mistakes: Mistakes
+) -> dict[str, Any]:
+    """Return the arguments of ``TileLayer``; note missing tiles."""
+    options = msgspec.to_builtins(tiles)
+    source = options.pop("source")
+    try:
+        datum = (options.pop("latitude"), options.pop("longitude"))
+        LocalPlane(*datum, options.get("east", 0.0))
+        # A source with a host is refused as written, before it is used as a path.
+        found = open_tiles(source if "://" in source else folder / source)
+        close = getattr(found, "close", None)
+        if close is not None:
+            close()
+    except ConfigError as error:
+        mistakes.add(("tiles", "source"), str(error))
+        return {}
+    return {"source": str((folder / source).absolute()), "datum": datum, **options}
