@@ -1,5 +1,5 @@
 import { devicesOf } from "./inputs/devices.js";
-import { standingStops } from "./motion/stopping.js";
+import { standingStops } from "./motion/stops.js";
 import { html, setText, stopButton } from "./tools/elements.js";
 
 /**

@@ -1,5 +1,5 @@
 import { svg } from "../../web/tools/elements.js";
-import { WORDS } from "../../web/motion/state_words.js";
+import { WORDS } from "../../web/constants.js";
 import { scaleOf } from "../../web/view.js";
 
 /**

@@ -1,5 +1,5 @@
 import { devicesOf } from "../../web/inputs/devices.js";
-import { attentive } from "../../web/motion/attention.js";
+import { attentive } from "../../web/inputs/focus.js";
 import { scaleOf, unapply } from "../../web/view.js";
 import { button, html, setHidden, setText } from "../../web/tools/elements.js";
 import { LabelMove } from "./labels_move.js";

@@ -1,5 +1,5 @@
 import { devicesOf } from "../../web/inputs/devices.js";
-import { attentive } from "../../web/motion/attention.js";
+import { attentive } from "../../web/inputs/focus.js";
 import { apply } from "../../web/view.js";
 import { button, html, setHidden, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";

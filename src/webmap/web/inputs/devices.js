@@ -5,7 +5,7 @@
  * the inputs move a robot is decided in `../motion`.
  */
 
-import { takesKeys, takesText } from "../motion/attention.js";
+import { takesKeys, takesText } from "./focus.js";
 import { Gamepads } from "./pads.js";
 import { Keys } from "./keys.js";
 

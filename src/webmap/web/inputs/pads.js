@@ -1,8 +1,8 @@
-import { attentive } from "../motion/attention.js";
+import { attentive } from "./focus.js";
 import { beyondDeadZone, axesOfStick } from "./stick.js";
 
 /** @typedef {import('../drive.js').Drive} Drive */
-/** @typedef {import('../motion/axes.js').Axes} Axes */
+/** @typedef {import('../motion/inputs.js').Axes} Axes */
 
 /** The button that must be held for a gamepad to drive: the left shoulder, LB or L1. */
 export const DEAD_MAN = 4;

@@ -1,7 +1,7 @@
-import { takesKeys } from "../motion/attention.js";
+import { takesKeys } from "./focus.js";
 
 /** @typedef {import('../drive.js').Drive} Drive */
-/** @typedef {import('../motion/axes.js').Axes} Axes */
+/** @typedef {import('../motion/inputs.js').Axes} Axes */
 
 /** How far the knob moves from the centre, as a share of the pad's radius. */
 const TRAVEL = 0.62;

@@ -1,5 +1,5 @@
 import { devicesOf } from "../inputs/devices.js";
-import { attentive } from "../motion/attention.js";
+import { attentive } from "../inputs/focus.js";
 import { apply, unapply } from "../view.js";
 
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */

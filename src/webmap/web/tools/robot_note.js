@@ -1,4 +1,4 @@
-import { Note } from "../motion/note.js";
+import { RefusalNote } from "../motion/report.js";
 import { setText } from "./elements.js";
 
 /**
@@ -10,7 +10,7 @@ import { setText } from "./elements.js";
  * @param {readonly string[]} robots
  */
 export function showNote(element, text, drive, robots) {
-  const notes = robots.map((robot) => ({ robot, note: new Note(text, "", performance.now()) }));
+  const notes = robots.map((robot) => ({ robot, note: new RefusalNote(text, "", performance.now()) }));
   setText(element, text);
   const off = drive.on("step", () => {
     const now = performance.now();

@@ -1,10 +1,10 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { LATE, LOST, Loop } from "../../../src/webmap/web/motion/loop.js";
+import { LATE, LOST, RoundTrip } from "../../../src/webmap/web/motion/round_trips.js";
 
 function opened() {
-  const loop = new Loop();
+  const loop = new RoundTrip();
   loop.open(0);
   loop.receive(100, -1, 0);
   return loop;

@@ -5,10 +5,10 @@ import {
   ANSWER_PATIENCE,
   Obedience,
   STAND_PATIENCE,
-  Stopping,
+  StopResults,
   standingStops,
   stopText,
-} from "../../../src/webmap/web/motion/stopping.js";
+} from "../../../src/webmap/web/motion/stops.js";
 
 const STILL = [0, 0, 0];
 const GOING = [0.4, 0, 0];
@@ -37,7 +37,7 @@ function report(fields = {}) {
 
 /** Stop r1 at time 0, receive one report at `at`, and return the verdict at `now`. */
 function verdict(reported, at, now, connected = true) {
-  const stopping = new Stopping();
+  const stopping = new StopResults();
   stopping.start("r1", new Map(), 0);
   if (reported) stopping.report(reported, at);
   const robots = new Map(reported ? [["r1", reported]] : []);
@@ -92,14 +92,14 @@ describe("a STOP", () => {
   });
 
   test("of all robots has a verdict for every robot", () => {
-    const stopping = new Stopping();
+    const stopping = new StopResults();
     stopping.start("*", new Map([["r1", report()], ["r2", report()]]), 0);
     const names = stopping.verdicts(new Map(), true, 1).map(({ robot }) => robot);
     assert.deepEqual(names, ["r1", "r2"]);
   });
 
   test("is shown until confirmed, and then for some seconds", () => {
-    const stopping = new Stopping();
+    const stopping = new StopResults();
     stopping.start("r1", new Map(), 0);
     const robots = new Map([["r1", report()]]);
     assert.equal(stopping.verdicts(robots, true, 60_000).length, 1);
@@ -115,7 +115,7 @@ describe("a STOP for all robots before any robot is known", () => {
 
   /** Stop all at time 0, and return the verdicts at `now` after some reports. */
   function verdicts(reports, now, connected = true) {
-    const stopping = new Stopping();
+    const stopping = new StopResults();
     stopping.start("*", new Map(), 0);
     const robots = new Map();
     for (const [at, reported] of reports) {
@@ -156,7 +156,7 @@ describe("a STOP for all robots before any robot is known", () => {
   });
 
   test("can be dismissed", () => {
-    const stopping = new Stopping();
+    const stopping = new StopResults();
     stopping.start("*", new Map(), 0);
     stopping.dismiss();
     stopping.report(report(free), 10);
@@ -189,14 +189,14 @@ describe("a latched STOP", () => {
   });
 
   test("sent again needs no new answer", () => {
-    const stopping = new Stopping();
+    const stopping = new StopResults();
     const robots = new Map([["r1", latched({ stop: stopOf(true) })]]);
     stopping.start("r1", robots, 0);
     assert.equal(stopping.verdicts(robots, true, 400)[0].state, "confirmed");
   });
 
   test("is removed by its Reset", () => {
-    const stopping = new Stopping();
+    const stopping = new StopResults();
     stopping.start("r1", new Map(), 0);
     stopping.report(latched({ stop: stopOf(false, "no odometry") }), 50);
     stopping.report(report({ state: "free", latched: false, stop: null }), 100);

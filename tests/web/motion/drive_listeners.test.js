@@ -1,10 +1,10 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { Listeners } from "../../../src/webmap/web/motion/drive_events.js";
+import { DriveListeners } from "../../../src/webmap/web/motion/session.js";
 
 test("a listener receives its events until its removal", () => {
-  const listeners = new Listeners();
+  const listeners = new DriveListeners();
   /** @type {string[]} */
   const received = [];
   const end = listeners.on("stop", (robot) => received.push(robot));
@@ -19,7 +19,7 @@ test("an error in a listener is reported and does not affect other listeners", (
   /** @type {unknown[]} */
   const reported = [];
   globalThis.reportError = (error) => reported.push(error);
-  const listeners = new Listeners();
+  const listeners = new DriveListeners();
   const failure = new Error("broken display");
   const received = [];
   listeners.on("drop", () => {

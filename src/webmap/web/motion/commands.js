@@ -1,10 +1,13 @@
-import { NEUTRAL, isNeutral } from "./axes.js";
-import { Pictures } from "./pictures.js";
+/** The commands of this page: the stream of the inputs, and single goals and poses. */
 
-/** @typedef {import('./axes.js').Axes} Axes */
+import { NEUTRAL, isNeutral } from "./inputs.js";
+import { TAKE_PATIENCE } from "./leases.js";
+
+/** @typedef {import('./inputs.js').Axes} Axes */
 /** @typedef {import('./inputs.js').Inputs} Inputs */
-/** @typedef {import('./loop.js').Loop} Loop */
-/** @typedef {import('./loops.js').Loops} Loops */
+/** @typedef {import('./round_trips.js').RoundTrip} RoundTrip */
+/** @typedef {import('./round_trips.js').RoundTrips} RoundTrips */
+/** @typedef {import('./pilot.js').Pilot} Pilot */
 
 /** @typedef {{op: string, robot: string, [field: string]: unknown}} Command */
 
@@ -14,7 +17,7 @@ import { Pictures } from "./pictures.js";
  * @typedef {object} Lease
  * @property {string} robot
  * @property {number} epoch
- * @property {Loop} loop The loop to the gate of the robot.
+ * @property {RoundTrip} loop The loop to the gate of the robot.
  * @property {number | null} firstNeutral The first command since `goNeutral`.
  * @property {number | null} seenSince Since when the gate acknowledges neutral commands.
  * @property {number} usedAt When it was last used, for motion or otherwise.
@@ -43,13 +46,13 @@ export const CALM = 500;
 export class Stream {
   /**
    * @param {Inputs} inputs
-   * @param {Loops} loops
+   * @param {RoundTrips} loops
    * @param {number} now
    */
   constructor(inputs, loops, now) {
     this.inputs = inputs;
     this.loops = loops;
-    this.pictures = new Pictures();
+    this.pictures = new PictureAges();
     /** @type {Lease | null} */
     this.lease = null;
     this._seq = 0;
@@ -178,7 +181,7 @@ export class Stream {
 
   /**
    * @param {string | null} robot
-   * @returns {Loop} The loop to the gate of the driven robot; without a lease, to that of
+   * @returns {RoundTrip} The loop to the gate of the driven robot; without a lease, to that of
    *     this robot.
    */
   _loop(robot) {
@@ -199,5 +202,154 @@ export class Stream {
     const video = this.pictures.age(robot);
     const picture = video === undefined ? {} : { video };
     return { op: "drive", robot, epoch, ...stamp, x, y, turn, ...picture };
+  }
+}
+
+/** The oldest camera picture that an operator may drive by; ms. */
+export const BLIND = 1000;
+
+/**
+ * The ages of the camera pictures that the operator drives by, for each robot.
+ */
+export class PictureAges {
+  constructor() {
+    /** @type {Map<string, () => number>} */
+    this._ages = new Map();
+  }
+
+  /**
+   * @param {string} robot
+   * @param {() => number} age Age of the picture that is shown now, in ms.
+   * @returns {() => void} Ends this.
+   */
+  goBy(robot, age) {
+    this._ages.set(robot, age);
+    return () => {
+      if (this._ages.get(robot) === age) this._ages.delete(robot);
+    };
+  }
+
+  /**
+   * @param {string} robot
+   * @returns {number | undefined} In whole ms; undefined if no camera was chosen.
+   */
+  age(robot) {
+    const age = this._ages.get(robot)?.();
+    return age === undefined ? undefined : Math.round(Math.min(Math.max(age, 0), 1e9));
+  }
+
+  /**
+   * @param {string} robot
+   * @returns {boolean} Whether the picture is too old to drive by (S16).
+   */
+  blind(robot) {
+    return (this.age(robot) ?? 0) > BLIND;
+  }
+}
+
+/**
+ * An operation that the gate has not answered yet.
+ *
+ * @typedef {object} PendingOperation
+ * @property {string} robot
+ * @property {string} what
+ * @property {number} since
+ * @property {() => boolean} reached Whether the gate has accepted it.
+ * @property {(problem: string | null) => void} end
+ */
+
+/**
+ * Sends goals and sets poses: takes the lease of a free robot for that, and waits for the
+ * gate's answer.
+ *
+ * Times are in milliseconds of one clock.
+ */
+export class PoseCommands {
+  /**
+   * @param {Pilot} pilot
+   * @param {RoundTrips} loops
+   * @param {(commands: Command[]) => void} send
+   * @param {() => number} clock
+   */
+  constructor(pilot, loops, send, clock) {
+    this._pilot = pilot;
+    this._loops = loops;
+    this._send = send;
+    this._clock = clock;
+    /** @type {Set<PendingOperation>} */
+    this._pending = new Set();
+  }
+
+  /**
+   * @param {'goal' | 'locate'} op
+   * @param {string} robot
+   * @param {{x: number, y: number, yaw: number}} pose Metres and radians.
+   * @returns {Promise<boolean>} Whether the lease was taken for this.
+   * @throws {Error} When the gate refuses it or does not answer.
+   */
+  async place(op, robot, { x, y, yaw }) {
+    if (![x, y, yaw].every(Number.isFinite)) {
+      throw new Error(`A ${op} needs finite numbers, got ${x}, ${y}, ${yaw}.`);
+    }
+    const taken = this._pilot.epoch(robot) === null;
+    if (taken) {
+      this._send([{ op: "take", robot }]);
+      await this._until(robot, "take", () => this._pilot.epoch(robot) !== null);
+    }
+    const command = this._pilot.place(op, robot, { x, y, yaw }, this._clock());
+    const loop = this._loops.of(robot);
+    this._send([command]);
+    try {
+      await this._until(robot, op, () => loop.acknowledged(command.seq));
+    } catch (error) {
+      if (taken) this._send(this._pilot.release(robot, this._clock()));
+      throw error;
+    }
+    return taken;
+  }
+
+  /**
+   * Process a refusal of the gate.
+   *
+   * @param {string | null} robot
+   * @param {string} what
+   * @param {string} why
+   */
+  refused(robot, what, why) {
+    for (const operation of this._pending) {
+      if (operation.robot === robot && operation.what === what) operation.end(why);
+    }
+  }
+
+  /** @param {number} now */
+  step(now) {
+    for (const operation of this._pending) {
+      if (operation.reached()) operation.end(null);
+      else if (now - operation.since > TAKE_PATIENCE) operation.end("no answer from the gate");
+    }
+  }
+
+  /**
+   * @param {string} robot
+   * @param {string} what
+   * @param {() => boolean} reached
+   * @returns {Promise<void>}
+   */
+  _until(robot, what, reached) {
+    return new Promise((resolve, reject) => {
+      /** @type {PendingOperation} */
+      const operation = {
+        robot,
+        what,
+        since: this._clock(),
+        reached,
+        end: (problem) => {
+          this._pending.delete(operation);
+          if (problem === null) resolve();
+          else reject(new Error(problem));
+        },
+      };
+      this._pending.add(operation);
+    });
   }
 }

@@ -1,13 +1,12 @@
 import assert from "node:assert/strict";
 import { beforeEach, test } from "node:test";
 
-import { LATE, LOST } from "../../../src/webmap/web/motion/loop.js";
-import { Loops } from "../../../src/webmap/web/motion/loops.js";
+import { LATE, LOST, RoundTrips } from "../../../src/webmap/web/motion/round_trips.js";
 
-/** @type {Loops} */
+/** @type {RoundTrips} */
 let loops;
 beforeEach(() => {
-  loops = new Loops();
+  loops = new RoundTrips();
   loops.open(0);
   reportRobot("r1");
   reportRobot("r2", "bay3", 0);

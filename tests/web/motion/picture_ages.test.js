@@ -1,16 +1,16 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { BLIND, Pictures } from "../../../src/webmap/web/motion/pictures.js";
+import { BLIND, PictureAges } from "../../../src/webmap/web/motion/commands.js";
 
 test("a robot without a camera has no picture age and is not blind", () => {
-  const pictures = new Pictures();
+  const pictures = new PictureAges();
   assert.equal(pictures.age("r1"), undefined);
   assert.equal(pictures.blind("r1"), false);
 });
 
 test("a picture is too old after a second", () => {
-  const pictures = new Pictures();
+  const pictures = new PictureAges();
   let age = BLIND;
   pictures.goBy("r1", () => age);
   assert.equal(pictures.blind("r1"), false);
@@ -20,7 +20,7 @@ test("a picture is too old after a second", () => {
 });
 
 test("a picture age is a finite whole number", () => {
-  const pictures = new Pictures();
+  const pictures = new PictureAges();
   for (const [age, shown] of [
     [12.6, 13],
     [-5, 0],
@@ -32,7 +32,7 @@ test("a picture age is a finite whole number", () => {
 });
 
 test("the end of one camera does not end the camera selected after it", () => {
-  const pictures = new Pictures();
+  const pictures = new PictureAges();
   const end = pictures.goBy("r1", () => 1);
   const endOther = pictures.goBy("r1", () => 2);
   end();

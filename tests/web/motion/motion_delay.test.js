@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { beforeEach, test } from "node:test";
 
-import { Onset } from "../../../src/webmap/web/motion/onset.js";
+import { MotionDelay } from "../../../src/webmap/web/motion/measurements.js";
 
 const STILL = { robot: "r1", measured: [0, 0, 0] };
 const GOING = { robot: "r1", measured: [0.1, 0, 0] };
@@ -9,7 +9,7 @@ const GOING = { robot: "r1", measured: [0.1, 0, 0] };
 let onset;
 
 beforeEach(() => {
-  onset = new Onset();
+  onset = new MotionDelay();
   onset.report(STILL, 0);
 });
 

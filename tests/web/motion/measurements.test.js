@@ -9,7 +9,7 @@ import {
   stoppingDistance,
   stopTestText,
   timings,
-} from "../../../src/webmap/web/motion/figures.js";
+} from "../../../src/webmap/web/motion/measurements.js";
 
 function report(fields = {}) {
   const known = { reaction: 0.6, brake: 0.5, state: "driving" };

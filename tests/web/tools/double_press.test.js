@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { LATEST, SOONEST, DoublePress } from "../../../src/webmap/web/motion/double_press.js";
+import { LATEST, SOONEST, DoublePress } from "../../../src/webmap/web/tools/elements.js";
 
 test("one press is not enough", () => {
   const twice = new DoublePress();

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { afterEach, beforeEach, test } from "node:test";
 
-import { watchAttention } from "../../../src/webmap/web/motion/attention.js";
+import { watchAttention } from "../../../src/webmap/web/inputs/focus.js";
 
 beforeEach(() => {
   globalThis.window = new EventTarget();
