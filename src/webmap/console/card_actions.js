@@ -1,4 +1,4 @@
-import { byId, closeSheet } from "../web/tools/dom.js";
+import { byId, closeSheet } from "../web/tools/elements.js";
 
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../web/drive.js').Drive} Drive */

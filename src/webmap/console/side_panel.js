@@ -1,4 +1,4 @@
-import { byId } from "../web/tools/dom.js";
+import { byId } from "../web/tools/elements.js";
 
 /**
  * The docked list of robots with the card: its width, whether it is open, and whether

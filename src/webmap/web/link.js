@@ -1,7 +1,7 @@
 /** The two sockets of a page: that of the display with the picture, and that of the gate. */
 
 import { FOR_GOOD } from "./constants.js";
-import { onSignIn, protocols } from "./key.js";
+import { onSignIn, protocols } from "./access.js";
 
 /** Milliseconds before a lost connection is opened again: first and longest wait. */
 const FIRST_WAIT = 250;

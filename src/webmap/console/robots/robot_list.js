@@ -1,6 +1,5 @@
 import { checkedList } from "../../web/layout.js";
-import { byId, typing } from "../../web/tools/dom.js";
-import { html, setHidden, setText, svg } from "../../web/tools/elements.js";
+import { byId, html, setHidden, setText, svg, typing } from "../../web/tools/elements.js";
 import { arranged, AT_FIRST, countsOf, isShown, MANY, orderFor } from "./robot_order.js";
 
 /**

@@ -4,8 +4,7 @@ import { scaleOf, unapply } from "../../web/view.js";
 import { button, html, setHidden, setText } from "../../web/tools/elements.js";
 import { LabelMove } from "./labels_move.js";
 import { lay } from "../../web/tools/overlay.js";
-import { showNote } from "../../web/tools/robot_note.js";
-import { tool, toolName } from "../../web/tools/tool.js";
+import { showNote, tool, toolName } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */

@@ -1,5 +1,49 @@
-import { BASE } from "./addresses.js";
-import { CODE, KEY, PAGE_ID, PROTOCOL } from "./constants.js";
+/** The addresses of the server that this page belongs to, and the page's key to it. */
+
+import { CODE, FOLDER, KEY, PAGE_ID, PROTOCOL } from "./constants.js";
+
+/** The URL below which WebMap serves its own files of this version. */
+export const OWN_FILES = new URL("..", import.meta.url);
+
+/** The URL below which WebMap serves files and sockets; its own files, of any version. */
+export const BASE = new URL(/\/v-\w+\/$/.test(OWN_FILES.pathname) ? ".." : ".", OWN_FILES);
+
+/**
+ * Resolve an address from the server to a file of the page.
+ *
+ * @param {string} address Those that begin with "/_webmap/" are below every prefix.
+ * @param {string | URL} base The base of other addresses.
+ * @returns {string | null} null if it is on another origin.
+ */
+export function resolve(address, base) {
+  const ours = address.startsWith(FOLDER);
+  try {
+    const url = ours ? new URL(address.slice(FOLDER.length), BASE) : new URL(address, base);
+    const web = url.protocol === "http:" || url.protocol === "https:";
+    return web && url.origin === BASE.origin ? url.href : null;
+  } catch {
+    return null;
+  }
+}
+
+/**
+ * @param {string} path Below {@link BASE}.
+ * @param {Record<string, string>} query
+ * @returns {URL} The address of a socket.
+ */
+export function socketAddress(path, query) {
+  const url = new URL(path, BASE);
+  url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+  url.search = new URLSearchParams(query).toString();
+  return url;
+}
+
+/** @returns {string} The path of this page, from the application's root. */
+export function pagePath() {
+  const root = new URL("..", BASE).pathname;
+  const path = decodeURI(location.pathname);
+  return path.startsWith(root) ? `/${path.slice(root.length)}` : path;
+}
 
 /**
  * The storage belongs to one origin, so a server on another port of the same host,
@@ -9,16 +53,16 @@ import { CODE, KEY, PAGE_ID, PROTOCOL } from "./constants.js";
 const NAME = `webmap key ${BASE.pathname}`;
 
 /** The key of this page; a browser may block its storage. */
-let given = "";
+let received = "";
 
 /** Store the key that the server sent to this page, and clean the address bar. */
 export function takeKey() {
   const element = document.querySelector(`meta[name="${KEY}"]`);
   if (element instanceof HTMLMetaElement) {
-    given = element.content;
+    received = element.content;
     element.remove();
     try {
-      localStorage.setItem(NAME, given);
+      localStorage.setItem(NAME, received);
     } catch {
       // The key works until the page is left.
     }
@@ -32,9 +76,9 @@ export function takeKey() {
 /** @returns {string} The newest key, which another tab may have received. */
 function key() {
   try {
-    return localStorage.getItem(NAME) ?? given;
+    return localStorage.getItem(NAME) ?? received;
   } catch {
-    return given;
+    return received;
   }
 }
 

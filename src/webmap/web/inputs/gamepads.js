@@ -1,8 +1,8 @@
 import { attentive } from "./focus.js";
 import { beyondDeadZone, axesOfStick } from "./stick.js";
 
-/** @typedef {import('../drive.js').Drive} Drive */
 /** @typedef {import('../motion/inputs.js').Axes} Axes */
+/** @typedef {import('../drive.js').Drive} Drive */
 
 /** The button that must be held for a gamepad to drive: the left shoulder, LB or L1. */
 export const DEAD_MAN = 4;

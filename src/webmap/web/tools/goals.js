@@ -1,3 +1,5 @@
+/** Goals of robots: their texts, which of them a page shows, and sending them. */
+
 import { GOALS } from "../constants.js";
 import { isOver } from "../motion/report.js";
 
