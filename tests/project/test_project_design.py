@@ -79,7 +79,7 @@ def test_no_folder_outside_the_gate_has_too_many_files(folder):
 
 
 def test_the_style_of_tools_names_no_tool_for_fields_messages_and_drawings() -> None:
-    style = (ROOT / "src/webmap/web/style/tool.css").read_text("utf-8")
+    style = (ROOT / "src/webmap/web/style/controls.css").read_text("utf-8")
     rules = re.sub(r"/\*.*?\*/", "", style, flags=re.S)
     assert not re.findall(r"\.webmap-\w+-(?:word:empty|drawing\b(?! ))", rules)
     assert not re.findall(r"\.webmap-(?!tool\b)\w+ :where\(input", rules)

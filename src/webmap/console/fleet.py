@@ -1,6 +1,6 @@
 """How the console shows a robot: its configured modules, its picture, name and state.
 
-``map.css`` and ``robots/robot_marks.css`` have the colours.
+``map.css`` has the colours.
 """
 
 import math
@@ -140,7 +140,7 @@ def shortened(name: str) -> str:
 class StateMark:
     """A robot's badge, name and words on the map, always upright; a module of robots.
 
-    ``robot_marks.css`` has sizes and places, in pixels.
+    ``map.css`` has sizes and places, in pixels.
     """
 
     def __init__(self, robot: "Robot") -> None:
