@@ -1,13 +1,14 @@
-import { svg } from "../../web/tools/elements.js";
-import { WORDS } from "../../web/constants.js";
-import { scaleOf } from "../../web/view.js";
+import { WORDS } from "../web/constants.js";
+import { svg } from "../web/tools/elements.js";
+import { scaleOf } from "../web/view.js";
+
+/** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
 
 /**
  * Names that do not cover one another on the map, and one mark for robots that overlap
  * in a small picture.
  */
 
-/** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 
 /** Milliseconds between two checks. */
 const PERIOD = 300;
