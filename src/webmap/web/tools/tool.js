@@ -84,6 +84,22 @@ export function foldedTool(className, symbol, name, attributes, ...content) {
 }
 
 /**
+ * Note that presses on a map belong to a tool, or no longer do. Meanwhile the pointer is a
+ * cross, and a press selects no robots.
+ *
+ * @param {SVGSVGElement} svg The map's.
+ * @param {string} name The tool's.
+ * @param {boolean} on
+ */
+export function claimPresses({ dataset }, name, on) {
+  const tools = new Set(dataset.webmapPress?.split(" "));
+  if (on) tools.add(name);
+  else tools.delete(name);
+  if (tools.size > 0) dataset.webmapPress = [...tools].join(" ");
+  else delete dataset.webmapPress;
+}
+
+/**
  * Show in an element why an operation was refused, until the causes of all robots are over.
  *
  * @param {Element} element
