@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { beforeEach, test } from "node:test";
 
-import { DEAD_MAN, Gamepads, Pads, SILENT } from "../../../src/webmap/web/inputs/gamepads.js";
+import { DEAD_MAN, Gamepads, Pads, SILENT } from "../../../src/webmap/web/inputs/sticks.js";
 
 const AHEAD = [0, -1, 0, 0];
 

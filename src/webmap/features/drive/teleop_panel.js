@@ -1,4 +1,4 @@
-import { Stick } from "../../web/inputs/stick.js";
+import { Stick } from "../../web/inputs/sticks.js";
 import { isTested, motions, ownStop, stopTestText, timings } from "../../web/motion/measurements.js";
 import { heldByProgram, isLatched, stopKey } from "../../web/motion/report.js";
 import { capOf, speedOf } from "../../web/motion/status.js";

@@ -6,7 +6,7 @@
  */
 
 import { takesKeys, takesText } from "./focus.js";
-import { Gamepads } from "./gamepads.js";
+import { Gamepads } from "./sticks.js";
 import { Keys } from "./keys.js";
 
 /** @typedef {import('../drive.js').Drive} Drive */
