@@ -83,45 +83,30 @@ def constants_js() -> str:
             {state: [words, shape] for state, (words, shape, _) in GOALS.items()},
             "The text and the shape of each state of a goal.",
         ),
+        "WORDS": (
+            STATE_TEXTS,
+            "The text of each state of a robot, the first that is true; `{who}` is its "
+            "operator.",
+        ),
+        "SEEN": (list(SEEN), "The states that the display finds besides the gate's."),
     }
     parts = ["// Made by tools/make_javascript.py: do not edit."]
     for name, (value, about) in constants.items():
+        text = json.dumps(value)
         if isinstance(value, dict):
             rows = (f"  {json.dumps(key)}: {json.dumps(value[key])}," for key in value)
             text = "\n".join(["Object.freeze({", *rows, "})"])
-        else:
-            text = json.dumps(value)
-        if isinstance(value, list):
+        elif isinstance(value, list):
             text = f"Object.freeze({text})"
+            if len(text) > 88:
+                text = _literal(value)
         parts.append(f"/** {about} */\nexport const {name} = {text};")
     return "\n\n".join(parts) + "\n"
-
-
-def state_words_js() -> str:
-    """Return the text of ``state_words.js``."""
-    texts = STATE_TEXTS.items()
-    rows = "".join(f"  {name}: {json.dumps(text)},\n" for name, text in texts)
-    seen = "".join(f"  {json.dumps(name)},\n" for name in SEEN)
-    return (
-        "// Made by tools/make_javascript.py from webmap/core/robot_state.py: do not "
-        "edit.\n"
-        "\n"
-        "/**\n"
-        " * The text for each state of a robot; `{who}` is its operator. Of several "
-        "that are\n"
-        " * true the first one is shown.\n"
-        " */\n"
-        f"export const WORDS = Object.freeze({{\n{rows}}});\n"
-        "\n"
-        "/** The states that the display finds besides that of the gate. */\n"
-        f"export const SEEN = Object.freeze([\n{seen}]);\n"
-    )
 
 
 FILES = {
     "opcodes.js": opcodes_js,
     "constants.js": constants_js,
-    "motion/state_words.js": state_words_js,
 }
 
 

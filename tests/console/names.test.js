@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { clustersOf, roomFor } from "../../src/webmap/console/robots/robot_marks.js";
+import { clustersOf, roomFor } from "../../src/webmap/console/robot_marks.js";
 
 const name = (x, y, first = false) => ({ x, y, width: 60, first });
 

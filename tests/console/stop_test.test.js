@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { StopTestButton } from "../../src/webmap/console/card_actions.js";
+import { StopTestButton } from "../../src/webmap/console/side_panel.js";
 
 /** A drive with one robot, and the requests that it received. */
 function driveWith(report) {

@@ -6,7 +6,7 @@ from playwright.sync_api import expect
 pytestmark = pytest.mark.browser
 
 SEND = """async ([path, texts]) => {
-  const { protocols } = await import("/_webmap/web/key.js");
+  const { protocols } = await import("/_webmap/web/access.js");
   const url = new URL(path, location.href.replace(/^http/, "ws"));
   const socket = new WebSocket(url, protocols());
   return await new Promise((resolve) => {

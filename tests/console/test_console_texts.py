@@ -7,7 +7,7 @@ import pytest
 from webmap.console.bar import summary
 from webmap.console.card_parts import cap, linear
 from webmap.console.robot_list import BatteryMark
-from webmap.console.texts import (
+from webmap.console.robot_looks import (
     LOOKS,
     battery_tone,
     heading,

@@ -8,7 +8,7 @@ from typing import get_args
 import pytest
 
 from webmap.base.geometry import Twist
-from webmap.console.texts import GROUPS, LOOKS
+from webmap.console.robot_looks import GROUPS, LOOKS
 from webmap.core.robot_state import STATE_TEXTS, Facts, state_of
 from webmap.gate.protocol import MAY_MOVE, Activity
 

@@ -3,7 +3,7 @@
 import os
 
 import webmap
-from webmap.console.fleet import robot_model
+from webmap.console.robot_looks import robot_model
 
 bridge = webmap.Bridge(os.environ["ALIGNING_URL"], name="north")
 robots = []

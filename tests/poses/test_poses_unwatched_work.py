@@ -10,7 +10,7 @@ from pose_script import CountingLoop, odometry
 
 import webmap
 from webmap.base.audience import RARELY, audience
-from webmap.console.fleet import make_robot
+from webmap.console.robot_looks import make_robot
 from webmap.features.alerts.alert_watch import AlertWatch
 from webmap.features.alerts.alerts import Alerts
 

@@ -78,8 +78,11 @@ def test_no_folder_outside_the_gate_has_too_many_files(folder):
     assert gate_is_last or len(files) <= MOST_FILES, len(files)
 
 
-def test_the_style_of_tools_names_no_tool_for_fields_messages_and_drawings() -> None:
-    style = (ROOT / "src/webmap/web/style/tool.css").read_text("utf-8")
-    rules = re.sub(r"/\*.*?\*/", "", style, flags=re.S)
-    assert not re.findall(r"\.webmap-\w+-(?:word:empty|drawing\b(?! ))", rules)
+def test_the_style_of_tools_has_no_class_of_a_single_tool() -> None:
+    style = (PACKAGE / "web/style/controls.css").read_text("utf-8")
+    rules = re.sub(r"/\*.*?\*/", "", style[style.index("/* Buttons. */") :], flags=re.S)
+    shared = "".join(file.read_text("utf-8") for file in PACKAGE.glob("web/**/*.js"))
+    tools = [file.read_text("utf-8") for file in PACKAGE.glob("features/**/*.js")]
+    for name in set(re.findall(r"\.(webmap-[\w-]+)", rules)) - {"webmap-console"}:
+        assert name in shared or sum(name in tool for tool in tools) > 1, name
     assert not re.findall(r"\.webmap-(?!tool\b)\w+ :where\(input", rules)

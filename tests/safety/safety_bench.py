@@ -43,7 +43,8 @@ def pass_time(seconds):
     time.sleep(seconds)
 
 
-RESET = """import("/_webmap/web/key.js").then(({ protocols }) => new Promise((done) => {
+RESET = """import("/_webmap/web/access.js")
+  .then(({ protocols }) => new Promise((done) => {
     const url = new URL("/_webmap/drive", location.href);
     url.protocol = "ws:";
     const socket = new WebSocket(url, protocols());

@@ -23,7 +23,7 @@ ON_THE_WAY = 0.1
 """Seconds for the transport to and from the gate, and for comparing the clocks."""
 
 DRIVE = """(async () => {
-    const { protocols } = await import("/_webmap/web/key.js");
+    const { protocols } = await import("/_webmap/web/access.js");
     const OFF = [0, 0];
     const PHASES = [
         [1, 0], [0, 1], [-1, 0], [0, -1], [1, 1], [-1, 1], [-1, -1], [1, -1],

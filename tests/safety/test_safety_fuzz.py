@@ -212,7 +212,7 @@ def test_a_valid_command_among_invalid_ones_moves_the_robot_for_200_ms_at_most(k
 FROM_THE_PAGE = """(async () => {
     const url = new URL("/_webmap/drive", location.href);
     url.protocol = "ws:";
-    const { protocols } = await import("/_webmap/web/key.js");
+    const { protocols } = await import("/_webmap/web/access.js");
     const socket = new WebSocket(url, protocols());
     let tick = null, robot = null, epoch = null, seq = 0, refused = 0, closed = false;
     socket.onclose = () => { closed = true; };

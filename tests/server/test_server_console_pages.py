@@ -7,7 +7,7 @@ from page_loop import make_model, objects_left, open_page, wait_for
 
 from webmap import Bridge, Robot, RobotConfig
 from webmap.console import make_robot
-from webmap.console.opened import Console
+from webmap.console.console import Console
 from webmap.console.page import build as build_console
 from webmap.core.layer import Layer
 from webmap.features.log.rosout_panel import RosoutPanel, log_of

@@ -78,13 +78,13 @@ def test_files_that_the_html_already_loads_are_not_added_again():
 
 def test_own_files_of_webmap_that_the_html_loads_get_the_address_of_their_version():
     text = (
-        '<head><link rel="stylesheet" href="../_webmap/web/style/row.css">\n'
+        '<head><link rel="stylesheet" href="../_webmap/web/style/controls.css">\n'
         '<link rel="stylesheet" href="web/own.css"></head>'
         '<body data-x="_webmap/web/"><img src="_webmap/files/x/y.png">'
         '<script src="/_webmap/features/x.js"></script>'
     )
     own = prepare_page(text, base_of("/a") + "v-12/").text
-    assert 'href="../_webmap/v-12/web/style/row.css">\n' in own
+    assert 'href="../_webmap/v-12/web/style/controls.css">\n' in own
     assert '<link rel="stylesheet" href="web/own.css">' in own
     assert '<body data-x="_webmap/web/">' in own
     assert '<img src="_webmap/files/x/y.png">' in own

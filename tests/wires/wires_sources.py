@@ -39,7 +39,7 @@ from wires_words import Names, lines, tree
 
 import webmap
 from webmap import cli
-from webmap.console.opened import Console
+from webmap.console.console import Console
 from webmap.gate import pipe
 from webmap.gate.display.client import GateClient
 from webmap.gate.specs import checked

@@ -5,8 +5,8 @@ example of the API. Open ``page`` first, then ``console.html``. What an operator
 on other pages too belongs in ``webmap.features``.
 """
 
-from webmap.console.fleet import make_robot
-from webmap.console.opened import Console
+from webmap.console.console import Console
 from webmap.console.page import open_console
+from webmap.console.robot_looks import make_robot
 
 __all__ = ["Console", "make_robot", "open_console"]

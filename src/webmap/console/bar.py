@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from webmap import html, refusals
 from webmap.base.text import counted
-from webmap.console.texts import icon
+from webmap.console.robot_looks import icon
 from webmap.poses.frames import frame_faults
 
 if TYPE_CHECKING:

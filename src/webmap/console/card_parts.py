@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from webmap import html, svg
 from webmap.base.geometry import Twist
 from webmap.base.text import counted
-from webmap.console.texts import UNKNOWN, number, sentence
+from webmap.console.robot_looks import UNKNOWN, number, sentence
 from webmap.features.doctor.doctor_panel import entry
 
 if TYPE_CHECKING:

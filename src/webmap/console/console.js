@@ -1,11 +1,9 @@
-import { listenToActions } from "./card_actions.js";
+import { listenToActions, listenToPanel } from "./side_panel.js";
 import { listenToPalette } from "./palette.js";
-import { listenToPanel } from "./side_panel.js";
-import { listenToRobots } from "./robots/robot_list.js";
-import { markRobots } from "./robots/robot_marks.js";
-import { byId, listenToSheet, nameSheet, typing } from "../web/tools/dom.js";
+import { listenToRobots } from "./robot_list.js";
+import { markRobots } from "./robot_marks.js";
+import { byId, listenToSheet, nameSheet, setText, typing } from "../web/tools/elements.js";
 import { keepInView, keepSizes, listenToList, listenToTools } from "./view_tools.js";
-import { setText } from "../web/tools/elements.js";
 
 /**
  * The parts of the console that run in the browser, because they must be quick or work

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 import webmap
 from webmap.console.bar import BridgeList, RefusedList
 from webmap.console.card_parts import RobotHealth
-from webmap.console.fleet import make_robot
+from webmap.console.console import Console
 from webmap.console.floor import Floor, load_floor
-from webmap.console.opened import Console
 from webmap.console.robot_card import RobotButtons, RobotCard
 from webmap.console.robot_list import RobotList
+from webmap.console.robot_looks import make_robot
 from webmap.features.alerts.alert_panel import AlertPanel
 from webmap.features.cameras.camera_panel import CameraPanel
 from webmap.features.doctor.doctor_panel import DoctorReports

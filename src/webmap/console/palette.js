@@ -1,5 +1,4 @@
-import { byId } from "../web/tools/dom.js";
-import { html, setHidden, setText } from "../web/tools/elements.js";
+import { byId, html, setHidden, setText } from "../web/tools/elements.js";
 
 /**
  * The command palette: one field that finds robots, tools, layers, places and settings,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from webmap import html
 from webmap.console.card_parts import GoalLine, OwnStop, SpeedTable
 from webmap.console.robot_list import AGE_LIMIT, StateShape
-from webmap.console.texts import UNKNOWN, heading, icon, look_of, number, sentence
+from webmap.console.robot_looks import UNKNOWN, heading, icon, look_of, number, sentence
 from webmap.features.cameras.camera_panel import CameraViews
 
 if TYPE_CHECKING:

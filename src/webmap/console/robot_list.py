@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from webmap import html, svg
 from webmap.config.robot import BATTERY_LOW
-from webmap.console.texts import GROUPS, LOOKS, battery_tone
+from webmap.console.robot_looks import GROUPS, LOOKS, battery_tone
 
 if TYPE_CHECKING:
     from webmap import Element, Map, Robot

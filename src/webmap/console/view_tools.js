@@ -1,4 +1,4 @@
-import { byId } from "../web/tools/dom.js";
+import { byId } from "../web/tools/elements.js";
 import { rotate } from "../web/view.js";
 
 /** @typedef {import('../web/view.js').Matrix} Matrix */

@@ -33,7 +33,7 @@ from webmap.config.fleet import MapConfig
 from webmap.config.reading import read_part
 from webmap.config.robot import PictureConfig, RobotConfig
 from webmap.console import Console, make_robot
-from webmap.console.fleet import draw_picture
+from webmap.console.robot_looks import draw_picture
 from webmap.core.motion import agent_robot_id, id_at_agent, shown_name
 from webmap.core.pictures import pictures
 from webmap.core.robot import apply_config

@@ -1,4 +1,4 @@
-import { OWN_FILES, resolve } from "./addresses.js";
+import { OWN_FILES, resolve } from "./access.js";
 import { PARTS, PART_FOLDERS, PART_SHEETS } from "./constants.js";
 
 /** @typedef {import('./map.js').MapCanvas} MapCanvas */

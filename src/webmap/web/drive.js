@@ -1,14 +1,13 @@
-import { attentive, watchAttention } from "./motion/attention.js";
-import { PoseCommands } from "./motion/pose_commands.js";
-import { GateLink } from "./motion/gate_link.js";
-import { Listeners } from "./motion/drive_events.js";
-import { Session } from "./motion/session.js";
+import { attentive, watchAttention } from "./inputs/focus.js";
+import { PoseCommands } from "./motion/commands.js";
+import { GateLink } from "./link.js";
+import { DriveListeners, Session } from "./motion/session.js";
 
-/** @typedef {import('./motion/axes.js').Axes} Axes */
-/** @typedef {import('./motion/drive_events.js').DriveEvent} DriveEvent */
-/** @typedef {import('./motion/drive_events.js').DriveEvents} DriveEvents */
+/** @typedef {import('./motion/inputs.js').Axes} Axes */
+/** @typedef {import('./motion/session.js').DriveEvent} DriveEvent */
+/** @typedef {import('./motion/session.js').DriveEvents} DriveEvents */
 /** @typedef {import('./motion/report.js').RobotReport} RobotReport */
-/** @typedef {import('./motion/stream.js').Command} Command */
+/** @typedef {import('./motion/commands.js').Command} Command */
 /** @typedef {{x: number, y: number, yaw: number}} Pose Metres and radians. */
 
 /** Milliseconds between two answers with the state of the inputs. */
@@ -36,7 +35,7 @@ export class Drive {
     const now = performance.now();
     this._session = new Session(now, options);
     this._pilot = this._session.pilot;
-    this._listeners = new Listeners();
+    this._listeners = new DriveListeners();
     this._poseCommands = new PoseCommands(
       this._pilot,
       this._session.loops,
@@ -116,7 +115,7 @@ export class Drive {
    * @param {string} robot
    */
   motionDelay(robot) {
-    return this._session.onset.delay(robot);
+    return this._session.motionDelay.delay(robot);
   }
 
   /**

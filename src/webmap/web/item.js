@@ -1,4 +1,4 @@
-import { resolve } from "./addresses.js";
+import { resolve } from "./access.js";
 import { BOOLEAN_ATTRIBUTES } from "./opcodes.js";
 import { setText } from "./tools/elements.js";
 

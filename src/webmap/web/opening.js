@@ -5,9 +5,8 @@
  * while the browser still loads and compiles the others.
  */
 
-import { pagePath, socketAddress } from "./addresses.js";
+import { pagePath, protocols, socketAddress, takeIdentity, takeKey } from "./access.js";
 import { LONGEST_TEXTS } from "./constants.js";
-import { protocols, takeIdentity, takeKey } from "./key.js";
 import { containers } from "./sizes.js";
 
 /** The relation of links to modules that a page loads when its first socket opens. */

@@ -6,13 +6,12 @@
  * and `tools/` has what tools share. What an operator can name is in `../features`.
  */
 
-import { BASE } from "./addresses.js";
+import { BASE, whyRefused } from "./access.js";
 import { LONGEST_TEXTS } from "./constants.js";
 import { Reports } from "./events.js";
 import { BrowserParts, importOf } from "./browser_parts.js";
-import { whyRefused } from "./key.js";
 import { Link } from "./link.js";
-import { Notices } from "./notices.js";
+import { Notices, showBareStop } from "./notices.js";
 import { dark, id, path, sceneAddress, takeFirstSocket } from "./opening.js";
 import { Scene } from "./scene.js";
 import { VersionError } from "./wire.js";
@@ -186,7 +185,6 @@ export class Page {
     this._offersStop = true;
     try {
       await this._loadDrive();
-      const { showBareStop } = await importOf(new URL("bare_stop.js", import.meta.url).href);
       if (this._hideBareStop) this._hideBareStop = showBareStop(this.drive);
     } catch {
       this._offersStop = false; // without a network; the next attempt may succeed

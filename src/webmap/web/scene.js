@@ -1,4 +1,4 @@
-import { BASE } from "./addresses.js";
+import { BASE } from "./access.js";
 import { Ages, DisplayClock } from "./ages.js";
 import { MOST_UNSEEN } from "./constants.js";
 import { Listeners } from "./events.js";

@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { assign, formation } from "../../../src/webmap/features/goals/goal_tool.js";
-import { look, ShownGoals } from "../../../src/webmap/web/tools/goal_texts.js";
+import { look, ShownGoals } from "../../../src/webmap/web/tools/goals.js";
 
 function goal(state, more = {}) {
   const silent = { left: null, time: null, eta: null, recoveries: null };

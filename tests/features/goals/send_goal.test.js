@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { RETRY, sendGoal, TRIES } from "../../../src/webmap/web/tools/goal_texts.js";
+import { RETRY, sendGoal, TRIES } from "../../../src/webmap/web/tools/goals.js";
 import { holdTimeouts, settle } from "../../web/tools/held_timeouts.js";
 
 const LINKLESS = "no connection to the bridge that takes goals";

@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { RouteRobots } from "../../../src/webmap/features/routes/route_run.js";
-import { TRIES } from "../../../src/webmap/web/tools/goal_texts.js";
+import { TRIES } from "../../../src/webmap/web/tools/goals.js";
 import { holdTimeouts, settle } from "../../web/tools/held_timeouts.js";
 
 const LINKLESS = "no connection to the bridge that takes goals";

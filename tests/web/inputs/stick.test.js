@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { beforeEach, test } from "node:test";
 
-import { Stick } from "../../../src/webmap/web/inputs/stick.js";
+import { Stick } from "../../../src/webmap/web/inputs/sticks.js";
 
 /** A fake of the pad with the parts that a stick needs. */
 class Pad extends EventTarget {

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { DEAD_ZONE, beyondDeadZone, axesOfStick } from "../../../src/webmap/web/inputs/stick.js";
+import { DEAD_ZONE, beyondDeadZone, axesOfStick } from "../../../src/webmap/web/inputs/sticks.js";
 
 const near = (axes, x, y, turn) => {
   for (const [value, expected] of [[axes.x, x], [axes.y, y], [axes.turn, turn]]) {

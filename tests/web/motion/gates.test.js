@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { beforeEach, describe, test } from "node:test";
 
-import { PoseCommands } from "../../../src/webmap/web/motion/pose_commands.js";
+import { PoseCommands } from "../../../src/webmap/web/motion/commands.js";
 import { Session } from "../../../src/webmap/web/motion/session.js";
 
 /**

@@ -3,7 +3,7 @@ import { test } from "node:test";
 
 import { Session } from "../../../src/webmap/web/motion/session.js";
 import { describe } from "../../../src/webmap/web/motion/status.js";
-import { CALM } from "../../../src/webmap/web/motion/stream.js";
+import { CALM } from "../../../src/webmap/web/motion/commands.js";
 
 const REPORT = {
   op: "robot",

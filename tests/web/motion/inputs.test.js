@@ -1,8 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { NEUTRAL, clean } from "../../../src/webmap/web/motion/axes.js";
-import { Inputs, REST } from "../../../src/webmap/web/motion/inputs.js";
+import { NEUTRAL, REST, Inputs, clean } from "../../../src/webmap/web/motion/inputs.js";
 
 const FORWARD = { x: 1, y: 0, turn: 0 };
 const LEFT = { x: 0, y: 0, turn: 1 };

@@ -2,10 +2,9 @@ import assert from "node:assert/strict";
 import { beforeEach, describe, test } from "node:test";
 
 import { Inputs } from "../../../src/webmap/web/motion/inputs.js";
-import { Leases } from "../../../src/webmap/web/motion/leases.js";
-import { Loops } from "../../../src/webmap/web/motion/loops.js";
-import { LeaseRequests, TAKE_PATIENCE } from "../../../src/webmap/web/motion/lease_requests.js";
-import { Stream } from "../../../src/webmap/web/motion/stream.js";
+import { TAKE_PATIENCE, LeaseRequests, Leases } from "../../../src/webmap/web/motion/leases.js";
+import { RoundTrips } from "../../../src/webmap/web/motion/round_trips.js";
+import { Stream } from "../../../src/webmap/web/motion/commands.js";
 
 const TAKE = [{ op: "take", robot: "r1" }];
 const MINE = { holder: { connection: "c1", name: "me" }, mine: true, epoch: 7 };
@@ -17,7 +16,7 @@ let it;
 beforeEach(() => {
   const inputs = new Inputs(-1000);
   const leases = new Leases();
-  const stream = new Stream(inputs, new Loops(), 0);
+  const stream = new Stream(inputs, new RoundTrips(), 0);
   it = { inputs, leases, stream, reach: new LeaseRequests(inputs, leases, stream) };
   reportRobot("r1", {}, 0);
   it.reach.choose("r1");

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { beforeEach, describe, test } from "node:test";
 
-import { TAKE_PATIENCE } from "../../../src/webmap/web/motion/lease_requests.js";
+import { TAKE_PATIENCE } from "../../../src/webmap/web/motion/leases.js";
 import { Bench, FORWARD } from "./pilot_bench.js";
 
 const moves = (messages) =>

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 
 import { Inputs } from "../../../src/webmap/web/motion/inputs.js";
-import { Loops } from "../../../src/webmap/web/motion/loops.js";
+import { RoundTrips } from "../../../src/webmap/web/motion/round_trips.js";
 import { Pilot } from "../../../src/webmap/web/motion/pilot.js";
 
 export const FORWARD = { x: 1, y: 0, turn: 0 };
@@ -19,7 +19,7 @@ export class Bench {
     this.epoch = 7;
     /** @type {any[]} */
     this.sent = [];
-    this.loops = new Loops();
+    this.loops = new RoundTrips();
     this.inputs = new Inputs(-1000);
     this.pilot = new Pilot(this.inputs, this.loops, 0, options);
     this.loops.open(0);

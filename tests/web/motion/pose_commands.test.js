@@ -1,8 +1,8 @@
 import assert from "node:assert/strict";
 import { beforeEach, test } from "node:test";
 
-import { PoseCommands } from "../../../src/webmap/web/motion/pose_commands.js";
-import { TAKE_PATIENCE } from "../../../src/webmap/web/motion/lease_requests.js";
+import { PoseCommands } from "../../../src/webmap/web/motion/commands.js";
+import { TAKE_PATIENCE } from "../../../src/webmap/web/motion/leases.js";
 import { Session } from "../../../src/webmap/web/motion/session.js";
 
 const POSE = { x: 1, y: 2, yaw: 0 };

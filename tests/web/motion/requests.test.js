@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { Requests } from "../../../src/webmap/web/motion/requests.js";
+import { ControlRequests } from "../../../src/webmap/web/motion/session.js";
 
 function report(fields = {}) {
   const asker = { connection: "c9", name: "Ann", left: 8 };
@@ -9,7 +9,7 @@ function report(fields = {}) {
 }
 
 test("the time left of a request counts down from the last report", () => {
-  const asking = new Requests();
+  const asking = new ControlRequests();
   asking.report(report(), 1000);
   assert.deepEqual(asking.requests(1000), [
     { robot: "r1", name: "Bob", by: "c9", who: "Ann", mine: true, left: 8 },
@@ -20,7 +20,7 @@ test("the time left of a request counts down from the last report", () => {
 
 test("a request ends when the report has no asker", () => {
   for (const asker of [null, undefined]) {
-    const asking = new Requests();
+    const asking = new ControlRequests();
     asking.report(report(), 0);
     asking.report(report({ asker }), 100);
     assert.deepEqual(asking.requests(100), []);
@@ -28,13 +28,13 @@ test("a request ends when the report has no asker", () => {
 });
 
 test("an asker without a name is shown with the connection", () => {
-  const asking = new Requests();
+  const asking = new ControlRequests();
   asking.report(report({ asker: { connection: "c9", name: "", left: 1 } }), 0);
   assert.equal(asking.requests(0)[0].who, "c9");
 });
 
 test("requests for a gone robot are removed", () => {
-  const asking = new Requests();
+  const asking = new ControlRequests();
   asking.report(report(), 0);
   asking.gone("r1");
   assert.deepEqual(asking.requests(0), []);

@@ -202,7 +202,7 @@ describe("a message of the gate", () => {
   test("about a robot that starts to move gives the time to motion", () => {
     drive();
     session.receive({ ...REPORT, measured: [0.5, 0, 0] }, 900);
-    assert.ok(Number(session.onset.delay("r1")) > 0);
+    assert.ok(Number(session.motionDelay.delay("r1")) > 0);
   });
 
   test("about a gone robot removes the robot, its request and its verdict", () => {

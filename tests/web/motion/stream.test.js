@@ -2,16 +2,16 @@ import assert from "node:assert/strict";
 import { beforeEach, describe, test } from "node:test";
 
 import { Inputs } from "../../../src/webmap/web/motion/inputs.js";
-import { Loops } from "../../../src/webmap/web/motion/loops.js";
-import { ASLEEP, SETTLE, Stream } from "../../../src/webmap/web/motion/stream.js";
+import { RoundTrips } from "../../../src/webmap/web/motion/round_trips.js";
+import { ASLEEP, SETTLE, Stream } from "../../../src/webmap/web/motion/commands.js";
 
 const FORWARD = { x: 1, y: 0, turn: 0 };
 
-/** @type {{inputs: Inputs, loops: Loops, stream: Stream, now: number}} */
+/** @type {{inputs: Inputs, loops: RoundTrips, stream: Stream, now: number}} */
 let it;
 beforeEach(() => {
   const inputs = new Inputs(-1000);
-  const loops = new Loops();
+  const loops = new RoundTrips();
   it = { inputs, loops, stream: new Stream(inputs, loops, 0), now: 0 };
   loops.open(0);
   loops.own.receive(100, -1, 0);

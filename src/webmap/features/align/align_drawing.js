@@ -22,7 +22,7 @@ export class AlignDrawing {
     /** The point of rotation, on the common map. @type {Point | null} */
     this.pivot = null;
     this._shadow = svg("g", { class: "webmap-align-shadow", "aria-hidden": "true" });
-    this._arm = svg("path", { class: "webmap-align-arm", "aria-hidden": "true" });
+    this._arm = svg("path", { class: "webmap-align-arm webmap-line", "aria-hidden": "true" });
     /** Rotates the alignment when dragged; receives the keys. */
     this.handle = svg(
       "g",
@@ -35,8 +35,8 @@ export class AlignDrawing {
         "aria-valuemax": "180",
       },
       svg("circle", { class: "webmap-align-reach", r: "22" }),
-      svg("circle", { class: "webmap-align-knob", r: "13" }),
-      svg("path", { class: "webmap-align-sign", d: "M-6 2a6 6 0 1 0 2-6M-7-7l3 3-3 3" }),
+      svg("circle", { class: "webmap-align-knob webmap-point", r: "13" }),
+      svg("path", { class: "webmap-align-sign webmap-line", d: "M-6 2a6 6 0 1 0 2-6M-7-7l3 3-3 3" }),
     );
     this.element = svg(
       "svg",

@@ -3,6 +3,7 @@ import { unapply } from "../../web/view.js";
 import { AlignDrawing, moved, rounded, turned } from "./align_drawing.js";
 import { AlignPanel } from "./align_panel.js";
 import { lay } from "../../web/tools/overlay.js";
+import { claimPresses } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/view.js').Point} Point */
 /** @typedef {import('./align_drawing.js').Alignment} Alignment */
@@ -156,7 +157,7 @@ class AlignTool {
     this._subject = subject;
     this._panel.open(subject);
     this._choose(subject.whole);
-    this._map.svg.classList.add("webmap-aligning");
+    claimPresses(this._map.svg, "align", true);
     this._drawing.handle.focus({ preventScroll: true });
     this._follow();
   }
@@ -169,7 +170,7 @@ class AlignTool {
     clearInterval(this._following);
     this._panel.close();
     this._drawing.hide();
-    this._map.svg.classList.remove("webmap-aligning");
+    claimPresses(this._map.svg, "align", false);
     return true;
   }
 

@@ -7,8 +7,8 @@ import {
   readKept,
   roomFor,
 } from "./camera_view.js";
-import { resolve } from "../../web/addresses.js";
-import { closeSheet } from "../../web/tools/dom.js";
+import { resolve } from "../../web/access.js";
+import { closeSheet } from "../../web/tools/elements.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('./camera_view.js').Dock} Dock */

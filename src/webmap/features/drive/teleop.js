@@ -1,5 +1,5 @@
 import { devicesOf } from "../../web/inputs/devices.js";
-import { stoppingDistance } from "../../web/motion/figures.js";
+import { stoppingDistance } from "../../web/motion/measurements.js";
 import { heldByAnother, isLatched, mayTake, stopOf } from "../../web/motion/report.js";
 import { describe, inputsOf } from "../../web/motion/status.js";
 import { svg } from "../../web/tools/elements.js";

@@ -1,5 +1,5 @@
-import { Stick } from "../../web/inputs/stick.js";
-import { isTested, motions, ownStop, stopTestText, timings } from "../../web/motion/figures.js";
+import { Stick } from "../../web/inputs/sticks.js";
+import { isTested, motions, ownStop, stopTestText, timings } from "../../web/motion/measurements.js";
 import { heldByProgram, isLatched, stopKey } from "../../web/motion/report.js";
 import { capOf, speedOf } from "../../web/motion/status.js";
 import {
@@ -12,7 +12,7 @@ import {
 } from "../../web/tools/elements.js";
 
 /** @typedef {import('../../web/drive.js').Drive} Drive */
-/** @typedef {import('../../web/motion/requests.js').Request} Request */
+/** @typedef {import('../../web/motion/session.js').Request} Request */
 /** @typedef {import('../../web/motion/report.js').RobotReport} RobotReport */
 
 /** Round trip from which the panel shows a warning, in ms. */

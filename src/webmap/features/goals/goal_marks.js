@@ -1,6 +1,6 @@
 import { onScreen } from "../../web/tools/aim.js";
 import { button, html, setHidden, setText, svg } from "../../web/tools/elements.js";
-import { look } from "../../web/tools/goal_texts.js";
+import { look } from "../../web/tools/goals.js";
 import { lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */

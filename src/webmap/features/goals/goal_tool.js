@@ -2,10 +2,9 @@ import { SPACING } from "../../web/constants.js";
 import { chosen, poseOf, PressAim } from "../../web/tools/aim.js";
 import { button, html, setHidden, setText } from "../../web/tools/elements.js";
 import { GoalMarks } from "./goal_marks.js";
-import { look, sendGoal, ShownGoals } from "../../web/tools/goal_texts.js";
+import { look, sendGoal, ShownGoals } from "../../web/tools/goals.js";
 import { lay } from "../../web/tools/overlay.js";
-import { showNote } from "../../web/tools/robot_note.js";
-import { tool, toolName } from "../../web/tools/tool.js";
+import { showNote, tool, toolName } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */

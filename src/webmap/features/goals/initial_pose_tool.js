@@ -2,8 +2,7 @@ import { scaleOf } from "../../web/view.js";
 import { onScreen, PressAim } from "../../web/tools/aim.js";
 import { button, html, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
-import { showNote } from "../../web/tools/robot_note.js";
-import { tool } from "../../web/tools/tool.js";
+import { showNote, tool } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */

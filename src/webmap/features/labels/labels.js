@@ -1,11 +1,10 @@
 import { devicesOf } from "../../web/inputs/devices.js";
-import { attentive } from "../../web/motion/attention.js";
+import { attentive } from "../../web/inputs/focus.js";
 import { scaleOf, unapply } from "../../web/view.js";
 import { button, html, setHidden, setText } from "../../web/tools/elements.js";
 import { LabelMove } from "./labels_move.js";
 import { lay } from "../../web/tools/overlay.js";
-import { showNote } from "../../web/tools/robot_note.js";
-import { tool, toolName } from "../../web/tools/tool.js";
+import { claimPresses, showNote, tool, toolName } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -70,7 +69,7 @@ class Labels {
   }
 
   destroy() {
-    this._map.svg.classList.remove("webmap-labelling");
+    claimPresses(this._map.svg, "labels", false);
     this._close("");
     this._ending.abort();
     for (const off of this._offs) off();
@@ -137,7 +136,7 @@ class Labels {
     this._close("");
     this._active = active && this._editable;
     this._go.setAttribute("aria-pressed", String(this._active));
-    this._map.svg.classList.toggle("webmap-labelling", this._active);
+    claimPresses(this._map.svg, "labels", this._active);
     setText(this._message, this._active ? "Press on the map where the label goes." : "");
     this._fit();
   }

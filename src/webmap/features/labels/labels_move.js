@@ -1,5 +1,6 @@
 import { unapply } from "../../web/view.js";
 import { button, html } from "../../web/tools/elements.js";
+import { claimPresses } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/view.js').Point} Point */
@@ -48,7 +49,7 @@ export class LabelMove {
     svg.addEventListener("pointerup", (event) => this._up(event), first);
     svg.addEventListener("pointercancel", () => (this._press = null), first);
     svg.addEventListener("click", (event) => event.stopImmediatePropagation(), first);
-    svg.classList.add("webmap-labelling");
+    claimPresses(svg, "labels", true);
     label.classList.add("moving");
     this._show();
   }
@@ -60,7 +61,7 @@ export class LabelMove {
 
   destroy() {
     this._ending.abort();
-    this._map.svg.classList.remove("webmap-labelling");
+    claimPresses(this._map.svg, "labels", false);
     this._label.classList.remove("moving");
     if (!this._accepted) this._put(this._from);
   }

@@ -245,7 +245,7 @@ class Book {
     const [word, outline, mark] = LOOKS[level] ?? LOOKS.info;
     const shape = svg(
       "svg",
-      { viewBox: "0 0 24 24", class: "webmap-rosout-shape", "aria-hidden": "true" },
+      { viewBox: "0 0 24 24", class: "webmap-rosout-shape webmap-symbol", "aria-hidden": "true" },
       svg("path", { d: outline, class: "solid" }),
       svg("path", { d: mark, class: "mark" }),
     );

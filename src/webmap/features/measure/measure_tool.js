@@ -1,9 +1,9 @@
 import { devicesOf } from "../../web/inputs/devices.js";
-import { attentive } from "../../web/motion/attention.js";
+import { attentive } from "../../web/inputs/focus.js";
 import { apply, unapply } from "../../web/view.js";
 import { button, html, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
-import { tool, toolName } from "../../web/tools/tool.js";
+import { claimPresses, tool, toolName } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/view.js').Point} Point */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -55,7 +55,7 @@ class MeasureTool {
     this._button.title = `Measure (${key.toUpperCase()})`;
     this._message = html("span", "webmap-measure-word", { role: "status" });
     const panel = tool("webmap-measure", "Measure", this._button, this._message);
-    this._path = svg("path", { class: "webmap-measure-line" });
+    this._path = svg("path", { class: "webmap-measure-line webmap-line" });
     this._drawing = svg(
       "svg",
       { class: "webmap-measure-drawing", "aria-hidden": "true" },
@@ -109,7 +109,7 @@ class MeasureTool {
     this._active = active;
     this._pointer = this._line = null;
     this._button.setAttribute("aria-pressed", String(active));
-    this._map.svg.classList.toggle("webmap-measuring", active);
+    claimPresses(this._map.svg, "measure", active);
     setText(this._message, active ? "Press on the map and drag to measure." : "");
     this._draw();
   }

@@ -1,5 +1,5 @@
 import { devicesOf } from "../../web/inputs/devices.js";
-import { attentive } from "../../web/motion/attention.js";
+import { attentive } from "../../web/inputs/focus.js";
 import { apply } from "../../web/view.js";
 import { button, html, setHidden, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
@@ -367,9 +367,9 @@ class AreaDrawing {
     this._map = map;
     /** @type {Point[]} */
     this._corners = [];
-    this._outline = svg("path", { class: "webmap-area-outline" });
-    this._ways = svg("path", { class: "webmap-area-ways" });
-    this._sweeps = svg("path", { class: "webmap-area-sweeps" });
+    this._outline = svg("path", { class: "webmap-area-outline webmap-line" });
+    this._ways = svg("path", { class: "webmap-area-ways webmap-line" });
+    this._sweeps = svg("path", { class: "webmap-area-sweeps webmap-line" });
     // In metres, like the plan: only the view moves it.
     this._world = svg("g", {}, this._outline, this._ways, this._sweeps);
     this._marks = svg("g", {});
@@ -404,7 +404,7 @@ class AreaDrawing {
       this._marks.lastChild?.remove();
     }
     while (this._marks.childElementCount < this._corners.length) {
-      this._marks.append(svg("circle", { class: "webmap-area-corner" }));
+      this._marks.append(svg("circle", { class: "webmap-area-corner webmap-point" }));
     }
     this._place();
   }

@@ -20,7 +20,7 @@ export class RoutePoints {
     this._moved = moved;
     /** @type {Pose[]} */
     this._points = [];
-    this._line = svg("polyline", { class: "webmap-route-line" });
+    this._line = svg("polyline", { class: "webmap-route-line webmap-line" });
     this._group = svg("g", {});
     this._drawing = svg(
       "svg",
@@ -58,7 +58,7 @@ export class RoutePoints {
     number.textContent = `${index + 1}`;
     const point = svg(
       "g",
-      { class: "webmap-route-point" },
+      { class: "webmap-route-point webmap-point" },
       svg("path", { d: NOSE }),
       svg("circle", { r: "12" }),
       number,

@@ -1,4 +1,4 @@
-import { look, sendGoal } from "../../web/tools/goal_texts.js";
+import { look, sendGoal } from "../../web/tools/goals.js";
 
 /** @typedef {import('../../web/tools/aim.js').Pose} Pose */
 /** @typedef {import('../../web/motion/report.js').RobotReport} RobotReport */

@@ -20,9 +20,6 @@ const PERIOD = 250;
 /** A drag shorter than this in pixels is a click. */
 const DRAG_FROM = 4;
 
-/** Classes of a map on which a tool waits for a press. */
-const TOOLS = ["webmap-aiming", "webmap-measuring", "webmap-labelling", "webmap-aligning"];
-
 /**
  * Select several robots by a box, and act on all of them. Sends `{mark: [robot]}`,
  * `{clear: true}` and `{aim: true}`; receives `{problem}`. STOP and the cancelling of
@@ -169,7 +166,7 @@ class Box {
   _down(event) {
     const { svg: root } = this._map;
     const onRobot = event.target instanceof Element && event.target.closest(".robot");
-    const used = TOOLS.some((tool) => root.classList.contains(tool));
+    const used = "webmapPress" in root.dataset;
     if (!event.shiftKey || event.button !== 0 || event.pointerType === "touch") return;
     if (onRobot || used || this._press) return;
     event.stopImmediatePropagation();

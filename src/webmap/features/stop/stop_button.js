@@ -1,7 +1,7 @@
 import { MAY_MOVE } from "../../web/constants.js";
 import { devicesOf } from "../../web/inputs/devices.js";
 import { isLatched, stopKey, stopOf } from "../../web/motion/report.js";
-import { Obedience, standingStops } from "../../web/motion/stopping.js";
+import { Obedience, standingStops } from "../../web/motion/stops.js";
 import {
   button,
   html,
@@ -15,7 +15,7 @@ import { lay } from "../../web/tools/overlay.js";
 /** @typedef {import('../../web/drive.js').Drive} Drive */
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
-/** @typedef {import('../../web/motion/stopping.js').Verdict} Verdict */
+/** @typedef {import('../../web/motion/stops.js').Verdict} Verdict */
 
 /**
  * Greatest number of robots of one Reset: a page that sends more than 120 messages at

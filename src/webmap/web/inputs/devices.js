@@ -5,8 +5,8 @@
  * the inputs move a robot is decided in `../motion`.
  */
 
-import { takesKeys, takesText } from "../motion/attention.js";
-import { Gamepads } from "./pads.js";
+import { takesKeys, takesText } from "./focus.js";
+import { Gamepads } from "./sticks.js";
 import { Keys } from "./keys.js";
 
 /** @typedef {import('../drive.js').Drive} Drive */

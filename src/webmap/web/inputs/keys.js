@@ -1,7 +1,7 @@
-import { attentive } from "../motion/attention.js";
+import { attentive } from "./focus.js";
 
 /** @typedef {import('../drive.js').Drive} Drive */
-/** @typedef {import('../motion/axes.js').Axes} Axes */
+/** @typedef {import('../motion/inputs.js').Axes} Axes */
 
 /**
  * The axes of each key, by position on the keyboard (`code`), for any layout.

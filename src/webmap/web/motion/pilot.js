@@ -1,11 +1,10 @@
-import { Leases } from "./leases.js";
-import { LeaseRequests, TAKE_PATIENCE } from "./lease_requests.js";
-import { Stream } from "./stream.js";
+import { TAKE_PATIENCE, LeaseRequests, Leases } from "./leases.js";
+import { Stream } from "./commands.js";
 
 /** @typedef {import('./inputs.js').Inputs} Inputs */
-/** @typedef {import('./loops.js').Loops} Loops */
+/** @typedef {import('./round_trips.js').RoundTrips} RoundTrips */
 /** @typedef {import('./report.js').RobotReport} RobotReport */
-/** @typedef {import('./stream.js').Command} Command */
+/** @typedef {import('./commands.js').Command} Command */
 
 /** The time between two renewals of a lease, in ms. */
 const RENEW = 10_000;
@@ -22,7 +21,7 @@ const RENEW = 10_000;
 export class Pilot {
   /**
    * @param {Inputs} inputs
-   * @param {Loops} loops
+   * @param {RoundTrips} loops
    * @param {number} now
    * @param {{releaseAfter?: number}} [options] `releaseAfter`: the lease is
    *     released after this time without motion, in ms.

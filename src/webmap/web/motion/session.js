@@ -3,21 +3,18 @@
  * to commands and events.
  *
  * This folder decides what the page sends to the gate. Open this file first, then
- * `pilot.js` and `stream.js`. The devices are read in `../inputs`.
+ * `pilot.js` and `commands.js`. The devices are read in `../inputs`.
  */
 
-import { Requests } from "./requests.js";
 import { Inputs } from "./inputs.js";
-import { Loops } from "./loops.js";
-import { Onset } from "./onset.js";
+import { MotionDelay } from "./measurements.js";
 import { Pilot } from "./pilot.js";
 import { isOver } from "./report.js";
-import { Stopping } from "./stopping.js";
-import { Unanswered } from "./unanswered.js";
+import { RoundTrips } from "./round_trips.js";
+import { StopResults, UnansweredStops } from "./stops.js";
 
-/** @typedef {import('./drive_events.js').DriveEvent} DriveEvent */
-/** @typedef {import('./drive_events.js').LinkState} LinkState */
-/** @typedef {import('./stream.js').Command} Command */
+/** @typedef {import('./commands.js').Command} Command */
+/** @typedef {import('./report.js').RobotReport} RobotReport */
 
 /**
  * The state that this page shares with the gates, across all its connections.
@@ -33,11 +30,11 @@ export class Session {
    */
   constructor(now, options) {
     this.inputs = new Inputs(now);
-    this.loops = new Loops();
+    this.loops = new RoundTrips();
     this.pilot = new Pilot(this.inputs, this.loops, now, options);
-    this.stopping = new Stopping();
-    this.requests = new Requests();
-    this.onset = new Onset();
+    this.stopping = new StopResults();
+    this.requests = new ControlRequests();
+    this.motionDelay = new MotionDelay();
     /**
      * This connection's name at the gate; null while there is none.
      * @type {string | null}
@@ -45,7 +42,7 @@ export class Session {
     this.connection = null;
     /** @type {LinkState} */
     this.state = "connecting";
-    this._unanswered = new Unanswered();
+    this._unanswered = new UnansweredStops();
     /**
      * STOPs to send first on the next connection.
      * @type {Set<string>}
@@ -111,7 +108,7 @@ export class Session {
     if (command.op === "goal") this._sentTo.set(robot, this.pilot.robots.get(robot)?.goal?.id);
     if (command.op !== "drive") return;
     const moving = ["x", "y", "turn"].some((axis) => command[axis] !== 0);
-    this.onset.sent(command.robot, moving, now);
+    this.motionDelay.sent(command.robot, moving, now);
   }
 
   /**
@@ -208,8 +205,8 @@ export class Session {
 
   /** The objects that process each report of a gate. The pilot needs the loops first. */
   get _watching() {
-    const { loops, pilot, stopping, requests, onset } = this;
-    return [loops, pilot, stopping, requests, onset, this._unanswered];
+    const { loops, pilot, stopping, requests, motionDelay } = this;
+    return [loops, pilot, stopping, requests, motionDelay, this._unanswered];
   }
 
   /**
@@ -234,5 +231,134 @@ export class Session {
     if (state === this.state) return [];
     this.state = state;
     return [["state", state]];
+  }
+}
+
+/**
+ * A request for control of a robot.
+ *
+ * @typedef {object} Request
+ * @property {string} robot
+ * @property {string} name The robot's.
+ * @property {string} by The connection of the requester.
+ * @property {string} who The name of the requester.
+ * @property {boolean} mine Whether this page's connection has control.
+ * @property {number} left Whole seconds until control is handed over automatically.
+ */
+
+/**
+ * Counts down the time that holders have to answer, from the gate's last report.
+ *
+ * Times are in milliseconds of one clock.
+ */
+export class ControlRequests {
+  constructor() {
+    /** @type {Map<string, {report: RobotReport, ends: number}>} */
+    this._requests = new Map();
+  }
+
+  /**
+   * @param {RobotReport} report
+   * @param {number} now
+   */
+  report(report, now) {
+    if (!report.asker) this._requests.delete(report.robot);
+    else {
+      const ends = now + 1000 * report.asker.left;
+      this._requests.set(report.robot, { report, ends });
+    }
+  }
+
+  /** @param {string} robot */
+  gone(robot) {
+    this._requests.delete(robot);
+  }
+
+  /** Forget all: the gate will report the requests again. */
+  forget() {
+    this._requests.clear();
+  }
+
+  /**
+   * @param {number} now
+   * @returns {Request[]}
+   */
+  requests(now) {
+    return [...this._requests.values()].map(({ report, ends }) => {
+      const asker = /** @type {import('./report.js').Asker} */ (report.asker);
+      return {
+        robot: report.robot,
+        name: report.name,
+        by: asker.connection,
+        who: asker.name || asker.connection,
+        mine: report.mine,
+        left: Math.max(0, Math.ceil((ends - now) / 1000)),
+      };
+    });
+  }
+}
+
+/** @typedef {'connecting' | 'open' | 'late' | 'lost'} LinkState */
+
+/**
+ * The kinds of events, and the value of each.
+ *
+ * `robot`: the gate's newest report on a robot. `gone`: the gate does not know a robot any
+ * more. `state`: the link's state changed. `refused`: the gate refused an operation.
+ * `stop`: STOP was sent for a robot or "*". `goal`: a goal was sent for a robot.
+ * `gamepad`: why a gamepad cannot drive, in a sentence; empty when it is gone. `read`:
+ * inputs without events of their own (gamepads) must be read now. `drop`: inputs must
+ * forget what is pressed. `step`: a 20 Hz step has ended.
+ *
+ * @typedef {object} DriveEvents
+ * @property {RobotReport} robot
+ * @property {string} gone
+ * @property {LinkState} state
+ * @property {{robot: string | null, what: string, why: string}} refused
+ * @property {string} stop
+ * @property {string} goal
+ * @property {string} gamepad
+ * @property {null} read
+ * @property {null} drop
+ * @property {null} step
+ */
+
+/** @typedef {{[K in keyof DriveEvents]: [kind: K, event: DriveEvents[K]]}[keyof DriveEvents]} DriveEvent */
+
+/** The listeners of each kind of event. */
+export class DriveListeners {
+  constructor() {
+    /** @type {Map<keyof DriveEvents, Set<Function>>} */
+    this._listeners = new Map();
+  }
+
+  /**
+   * @template {keyof DriveEvents} K
+   * @param {K} kind
+   * @param {(event: DriveEvents[K]) => void} fn
+   * @returns {() => void} Stops listening.
+   */
+  on(kind, fn) {
+    const listeners = this._listeners.get(kind) ?? new Set();
+    this._listeners.set(kind, listeners.add(fn));
+    return () => {
+      listeners.delete(fn);
+    };
+  }
+
+  /**
+   * @template {keyof DriveEvents} K
+   * @param {K} kind
+   * @param {DriveEvents[K]} event
+   */
+  emit(kind, event) {
+    for (const fn of this._listeners.get(kind) ?? []) {
+      try {
+        fn(event);
+      } catch (error) {
+        // An error of a listener must never prevent the sending of neutral or of STOP.
+        reportError(error);
+      }
+    }
   }
 }

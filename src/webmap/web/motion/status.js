@@ -1,12 +1,12 @@
-import { isTested, signed, speedAlong } from "./figures.js";
+import { isTested, signed, speedAlong } from "./measurements.js";
 import { doingOf, heldByAnother, isLatched } from "./report.js";
-import { WORDS } from "./state_words.js";
-import { stopText } from "./stopping.js";
+import { WORDS } from "../constants.js";
+import { stopText } from "./stops.js";
 
-/** @typedef {import('./requests.js').Request} Request */
+/** @typedef {import('./session.js').Request} Request */
 /** @typedef {import('./pilot.js').Pilot} Pilot */
 /** @typedef {import('./report.js').RobotReport} RobotReport */
-/** @typedef {import('./stopping.js').Verdict} Verdict */
+/** @typedef {import('./stops.js').Verdict} Verdict */
 
 /**
  * The state of driving a robot from this page. A page shows it as text, a shape and a

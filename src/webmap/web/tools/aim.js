@@ -1,6 +1,7 @@
 import { devicesOf } from "../inputs/devices.js";
-import { attentive } from "../motion/attention.js";
+import { attentive } from "../inputs/focus.js";
 import { apply, unapply } from "../view.js";
+import { claimPresses } from "./tool.js";
 
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../view.js').Matrix} Matrix */
@@ -162,7 +163,7 @@ export class PressAim {
     if (this.active) this._takeMap();
     const back = this.active ? null : this._leaveMap();
     if (this.active !== was) {
-      this._map.svg.classList.toggle("webmap-aiming", active.has(this._map));
+      claimPresses(this._map.svg, "aim", active.has(this._map));
     }
     this._aims.changed(this.active);
     // Else the next press of the interrupted tool would select no robot.

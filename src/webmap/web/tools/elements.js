@@ -1,4 +1,6 @@
-import { DoublePress } from "../motion/double_press.js";
+/** Elements of pages: how they are made, changed and pressed. */
+
+/** @typedef {import('../map.js').MapCanvas} MapCanvas */
 
 /**
  * Make an HTML element.
@@ -168,4 +170,124 @@ export class TwiceButton {
     this.element.classList.toggle("asking", waiting);
     setText(this.element, waiting ? this._again : label);
   }
+}
+
+/** An earlier second press belongs to a double click; ms. */
+export const SOONEST = 400;
+
+/** After this long the first press is forgotten; ms. */
+export const LATEST = 4000;
+
+/**
+ * Decides whether the operator confirms an action: by two presses, neither too fast nor
+ * too slow.
+ *
+ * Times are in milliseconds of one clock.
+ */
+export class DoublePress {
+  constructor() {
+    /** @type {number | null} */
+    this._since = null;
+    /**
+     * What the first press applies to, without what has disappeared since.
+     * @type {readonly string[]}
+     */
+    this.meant = [];
+  }
+
+  /**
+   * @param {number} now
+   * @param {readonly string[]} [there] What a first press applies to: ids of robots, or
+   *     of their STOPs.
+   * @returns {boolean} Whether this is a deliberate second press.
+   */
+  press(now, there = []) {
+    if (!this.waiting(now)) {
+      this._since = now;
+      this.meant = there;
+      return false;
+    }
+    if (now - Number(this._since) < SOONEST) return false;
+    this._since = null;
+    return true;
+  }
+
+  /**
+   * @param {number} now
+   * @returns {boolean} Whether a first press waits for the second.
+   */
+  waiting(now) {
+    return this._since !== null && now >= this._since && now - this._since <= LATEST;
+  }
+
+  /**
+   * Forget the first press if something appeared that it does not apply to.
+   *
+   * @param {readonly string[]} there
+   */
+  look(there) {
+    if (there.some((one) => !this.meant.includes(one))) this.forget();
+    else this.meant = there;
+  }
+
+  /** Forget the first press. */
+  forget() {
+    this._since = null;
+  }
+}
+
+/** @param {string} id */
+export function byId(id) {
+  const element = document.getElementById(id);
+  if (element === null) throw new Error(`console.html has no element "${id}".`);
+  return element;
+}
+
+/** @param {KeyboardEvent} event */
+export function typing({ target }) {
+  return target instanceof Element && target.matches("input, textarea, select");
+}
+
+/**
+ * Open and close the sheet on a narrow screen.
+ *
+ * @param {AbortSignal} signal
+ */
+export function listenToSheet(signal) {
+  const handle = byId("sheet");
+  const turn = () => {
+    const open = handle.getAttribute("aria-expanded") === "true";
+    handle.setAttribute("aria-expanded", `${!open}`);
+  };
+  handle.addEventListener("click", turn, { signal });
+}
+
+/**
+ * Show the selected robots on the sheet's handle, for a closed sheet.
+ *
+ * @param {MapCanvas} map
+ */
+export function nameSheet(map) {
+  const text = byId("sheet-text");
+  const show = () => {
+    const row = `#robots [data-robot="${map.selected}"]`;
+    const name = document.querySelector(`${row} .name`)?.textContent;
+    const states = [...document.querySelectorAll(`${row} .state > *`)]
+      .filter((one) => getComputedStyle(one).display !== "none")
+      .map((one) => one.textContent);
+    const count = byId("robots-count").textContent ?? "";
+    setText(text, name ? `${name}: ${states.join(" \u00b7 ")}` : count);
+  };
+  show();
+  const timer = setInterval(show, 500);
+  const off = map.onSelect(show);
+  return () => {
+    clearInterval(timer);
+    off();
+  };
+}
+
+/** Close the sheet, if it covers the map. */
+export function closeSheet() {
+  byId("sheet").setAttribute("aria-expanded", "false");
 }

@@ -66,7 +66,7 @@ class SaveMenu {
       "button",
       `webmap-export-go ${classes || "webmap-button"}`,
       { type: "button", "aria-expanded": "false", "aria-haspopup": "true" },
-      svg("svg", { viewBox: "0 0 24 24", class: "icon", "aria-hidden": "true" }, icon),
+      svg("svg", { viewBox: "0 0 24 24", class: "icon webmap-symbol", "aria-hidden": "true" }, icon),
     );
     this._go.addEventListener("click", () => this._open(Boolean(this._menu.hidden)));
     this._menu = html("div", "webmap-panel webmap-export-menu");

@@ -1,4 +1,7 @@
-import { button, html, svg } from "./elements.js";
+/** The frame of a tool: its button, its body, and the note about a refusal. */
+
+import { RefusalNote } from "../motion/report.js";
+import { button, html, svg, setText } from "./elements.js";
 
 /** Symbols of tools, as SVG paths in a square of 24. */
 const SYMBOLS = {
@@ -78,4 +81,41 @@ export function foldedTool(className, symbol, name, attributes, ...content) {
     body,
   );
   return details;
+}
+
+/**
+ * Note that presses on a map belong to a tool, or no longer do. Meanwhile the pointer is a
+ * cross, and a press selects no robots.
+ *
+ * @param {SVGSVGElement} svg The map's.
+ * @param {string} name The tool's.
+ * @param {boolean} on
+ */
+export function claimPresses({ dataset }, name, on) {
+  const tools = new Set(dataset.webmapPress?.split(" "));
+  if (on) tools.add(name);
+  else tools.delete(name);
+  if (tools.size > 0) dataset.webmapPress = [...tools].join(" ");
+  else delete dataset.webmapPress;
+}
+
+/**
+ * Show in an element why an operation was refused, until the causes of all robots are over.
+ *
+ * @param {Element} element
+ * @param {string} text
+ * @param {import('../drive.js').Drive} drive
+ * @param {readonly string[]} robots
+ */
+export function showNote(element, text, drive, robots) {
+  const notes = robots.map((robot) => ({ robot, note: new RefusalNote(text, "", performance.now()) }));
+  setText(element, text);
+  const off = drive.on("step", () => {
+    const now = performance.now();
+    const over = notes.filter(({ robot, note }) => note.isOver(drive.robots.get(robot), now));
+    const replaced = element.textContent !== text;
+    if (!replaced && over.length < notes.length) return;
+    if (!replaced) setText(element, "");
+    off();
+  });
 }

@@ -1,0 +1,397 @@
+/**
+ * The list of robots: search, order, groups, counts by state that filter, and keys.
+ * The choice is a part of the layout, and stored in the browser.
+ */
+
+import { checkedList } from "../web/layout.js";
+import { byId, html, setHidden, setText, svg, typing } from "../web/tools/elements.js";
+
+/** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {Listed & {row: HTMLElement}} Row */
+
+/** The key of the choice in this browser's storage. */
+const KEPT = "webmap.list";
+
+/** Milliseconds between two counts, and between two changes of the order. */
+const COUNT_EVERY = 500;
+const ORDER_EVERY = 2000;
+
+/**
+ * @param {MapCanvas} map
+ * @param {AbortSignal} signal
+ * @returns {() => void} Leaves the map and its layout.
+ */
+export function listenToRobots(map, signal) {
+  const list = new RobotList(signal);
+  const choosing = () => byId("robots").classList.toggle("choosing", map.selected !== null);
+  const offs = [
+    map.onSelect(choosing),
+    map.layout.add("list", {
+      read: () => list.choice,
+      write: (choice) => list.choose(choice),
+      reset: () => list.choose(AT_FIRST),
+    }),
+  ];
+  choosing();
+  return () => {
+    for (const off of offs) off();
+  };
+}
+
+class RobotList {
+  /** @param {AbortSignal} signal */
+  constructor(signal) {
+    this._list = byId("robots");
+    this._search = /** @type {HTMLInputElement} */ (byId("search"));
+    this._order = /** @type {HTMLSelectElement} */ (byId("robot-order"));
+    this._group = /** @type {HTMLSelectElement} */ (byId("robot-group"));
+    /** @type {Choice} */
+    this.choice = kept();
+    /** @type {WeakMap<HTMLElement, number>} When each row was seen first. */
+    this._added = new WeakMap();
+    this._count = 0;
+    /** @type {Map<string, HTMLButtonElement>} */
+    this._chips = new Map();
+    /** Whether a mouse is over the list; a finger leaves no trace. */
+    this._over = false;
+    this._listen(signal);
+    this._listenToSearch(signal);
+    this._listenToKeys(signal);
+    this._update();
+    this._arrange();
+  }
+
+  /** @param {Partial<Choice>} part */
+  choose(part) {
+    this.choice = { ...this.choice, ...part };
+    keep(this.choice);
+    this._update();
+    this._arrange();
+  }
+
+  /** @param {AbortSignal} signal */
+  _listen(signal) {
+    const over = (/** @type {PointerEvent} */ { type, pointerType }) => {
+      this._over = type === "pointerenter" && pointerType !== "touch";
+    };
+    this._list.addEventListener("pointerenter", over, { signal });
+    this._list.addEventListener("pointerleave", over, { signal });
+    const chosen = () => {
+      const { value: order } = this._order;
+      const { value: group } = this._group;
+      this.choose(/** @type {Partial<Choice>} */ ({ order, group }));
+    };
+    this._order.addEventListener("change", chosen, { signal });
+    this._group.addEventListener("change", chosen, { signal });
+    const arrange = () => {
+      const used = this._over || this._list.contains(document.activeElement);
+      if (!used) this._arrange();
+    };
+    const newcomers = new MutationObserver(() => {
+      this._update();
+      arrange();
+    });
+    newcomers.observe(this._list, { childList: true });
+    const counts = setInterval(() => this._update(), COUNT_EVERY);
+    const orders = setInterval(arrange, ORDER_EVERY);
+    signal.addEventListener("abort", () => {
+      newcomers.disconnect();
+      clearInterval(counts);
+      clearInterval(orders);
+    });
+  }
+
+  /** @returns {Row[]} In the order of the page. */
+  _rows() {
+    return [...this._list.querySelectorAll(":scope > .row")].flatMap((row) => {
+      if (!(row instanceof HTMLElement)) return [];
+      const added = this._added.get(row) ?? this._count++;
+      this._added.set(row, added);
+      const { group = "", rank, tag = "", bridge = "", charge } = row.dataset;
+      const name = row.querySelector(".name")?.textContent ?? "";
+      return [
+        {
+          row,
+          name,
+          group,
+          rank: Number(rank ?? Infinity),
+          tag,
+          bridge,
+          charge: charge === undefined ? null : Number(charge),
+          added,
+        },
+      ];
+    });
+  }
+
+  /** Show the tools of a long list, the counts, and the robots that the filter leaves. */
+  _update() {
+    const rows = this._rows();
+    const long = rows.length > MANY || rows.some(({ tag }) => tag);
+    setHidden(byId("robot-tools"), !long);
+    byId("robots-part").classList.toggle("long", long);
+    this._order.value = orderFor(this.choice.order, rows.length);
+    this._group.value = this.choice.group;
+    const states = long ? this.choice.states : [];
+    this._showChips(rows);
+    const wanted = this._search.value.trim();
+    for (const robot of rows) {
+      robot.row.classList.toggle("filtered", !isShown(robot, wanted, states));
+    }
+    for (const title of this._list.querySelectorAll(":scope > .group-name")) {
+      let next = title.nextElementSibling;
+      while (next?.classList.contains("filtered")) next = next.nextElementSibling;
+      title.classList.toggle("filtered", !next?.classList.contains("row"));
+    }
+    const found = this._buttons().length;
+    const filtered = wanted !== "" || states.length > 0;
+    setHidden(byId("select-shown"), !filtered || found < 2);
+    const none = rows.length > 0 && found === 0;
+    setText(byId("not-found"), none ? noneText(wanted, states) : "");
+  }
+
+  /** @param {Row[]} rows */
+  _showChips(rows) {
+    const { states } = this.choice;
+    const counts = countsOf(rows, states);
+    for (const [group, chip] of this._chips) {
+      if (counts.some((each) => each.group === group)) continue;
+      chip.remove();
+      this._chips.delete(group);
+    }
+    const place = byId("robot-chips");
+    counts.forEach(({ group, count }, index) => {
+      const chip = this._chips.get(group) ?? this._chip(group);
+      this._chips.set(group, chip);
+      const row = rows.find((each) => each.group === group)?.row;
+      const shape = row?.querySelector(".shape.now use")?.getAttribute("href");
+      if (shape) chip.querySelector("use")?.setAttribute("href", shape);
+      if (row) chip.dataset.tone = row.dataset.tone ?? "";
+      setText(/** @type {Element} */ (chip.lastElementChild), `${count} ${group}`);
+      chip.setAttribute("aria-pressed", `${states.includes(group)}`);
+      // A chip that is moved loses the focus.
+      if (place.children[index] !== chip) place.insertBefore(chip, place.children[index] ?? null);
+    });
+  }
+
+  /** @param {string} group */
+  _chip(group) {
+    const shape = svg("svg", { class: "shape", "aria-hidden": "true" }, svg("use", {}));
+    const chip = html("button", "chip", { type: "button" }, shape, html("span", ""));
+    chip.addEventListener("click", () => {
+      const { states } = this.choice;
+      const others = states.filter((each) => each !== group);
+      this.choose({ states: others.length < states.length ? others : [...states, group] });
+    });
+    return chip;
+  }
+
+  /** Put the rows in order, below the names of their groups. */
+  _arrange() {
+    const rows = this._rows();
+    const long = !byId("robot-tools").hidden;
+    const groups = arranged(rows, long ? this.choice : AT_FIRST);
+    const old = [...this._list.querySelectorAll(":scope > .group-name")];
+    const wanted = groups.flatMap(({ name, robots }) => {
+      const text = `${name} (${robots.length})`;
+      const known = old.find((each) => each.textContent === text);
+      const title = known ?? html("li", "group-name", { dir: "auto", title: name }, text);
+      return [...(name ? [title] : []), ...robots.map(({ row }) => row)];
+    });
+    const shown = [...this._list.children];
+    if (wanted.length === shown.length && wanted.every((each, i) => each === shown[i])) return;
+    for (const title of old) if (!wanted.includes(title)) title.remove();
+    wanted.forEach((each, index) => {
+      const there = this._list.children[index];
+      if (there !== each) this._list.insertBefore(each, there ?? null);
+    });
+  }
+
+  /** @returns {HTMLElement[]} The buttons that select the listed robots. */
+  _buttons() {
+    const path = ":scope > .row:not(.filtered) [aria-pressed]";
+    return /** @type {HTMLElement[]} */ ([...this._list.querySelectorAll(path)]);
+  }
+
+  /**
+   * Enter selects the robot if the search leaves only one.
+   *
+   * @param {AbortSignal} signal
+   */
+  _listenToSearch(signal) {
+    const input = this._search;
+    input.addEventListener("input", () => this._update(), { signal });
+    const choose = (/** @type {KeyboardEvent} */ event) => {
+      const [first, ...more] = this._buttons();
+      if (event.key === "Enter" && more.length === 0) first?.click();
+      if (event.key !== "ArrowDown" || !first) return;
+      event.preventDefault();
+      first.focus();
+    };
+    input.addEventListener("keydown", choose, { signal });
+    const key = (/** @type {KeyboardEvent} */ event) => {
+      if (event.key !== "/" || event.ctrlKey || event.metaKey || typing(event)) return;
+      event.preventDefault();
+      input.focus();
+    };
+    document.addEventListener("keydown", key, { signal });
+  }
+
+  /**
+   * The arrow keys move in the list while the keyboard has brought the focus there.
+   * After a click on a robot they drive it, as everywhere else.
+   *
+   * @param {AbortSignal} signal
+   */
+  _listenToKeys(signal) {
+    let clicked = false;
+    const press = () => {
+      clicked = true;
+    };
+    this._list.addEventListener("pointerdown", press, { signal });
+    const leave = (/** @type {FocusEvent} */ { relatedTarget }) => {
+      if (!(relatedTarget instanceof Node && this._list.contains(relatedTarget))) clicked = false;
+    };
+    this._list.addEventListener("focusout", leave, { signal });
+    const key = (/** @type {KeyboardEvent} */ event) => {
+      if (event.key === "Tab") clicked = false;
+      const buttons = this._buttons();
+      const at = buttons.findIndex((each) => each === document.activeElement);
+      const to = { ArrowUp: at - 1, ArrowDown: at + 1, Home: 0, End: buttons.length - 1 }[event.key];
+      if (to === undefined || at < 0 || clicked) return;
+      event.preventDefault();
+      event.stopPropagation();
+      buttons[to]?.focus();
+    };
+    this._list.addEventListener("keydown", key, { signal });
+  }
+}
+
+/**
+ * @param {string} wanted
+ * @param {string[]} states
+ */
+function noneText(wanted, states) {
+  const filter = states.length > 0 ? ` among those that are ${states.join(" or ")}` : "";
+  if (wanted === "") return `No robot${filter}.`;
+  return `No robot has “${wanted}” in its name${filter}.`;
+}
+
+/** @returns {Choice} */
+function kept() {
+  try {
+    return checkedList(JSON.parse(localStorage.getItem(KEPT) ?? "null"), KEPT);
+  } catch {
+    return AT_FIRST;
+  }
+}
+
+/** @param {Choice} choice */
+function keep(choice) {
+  try {
+    localStorage.setItem(KEPT, JSON.stringify(choice));
+  } catch {
+    // A browser without storage opens the page with the usual list.
+  }
+}
+
+/**
+ * The order, the groups and the filter of the list of robots, without the page.
+ *
+ * @typedef {import('../web/layout.js').List} Choice What the operator has chosen.
+ * @typedef {Choice['order']} Order
+ *
+ * @typedef {object} Listed
+ * @property {string} name
+ * @property {string} group The group of its state, such as `stopped`.
+ * @property {number} rank The place of that group; 0 is the worst.
+ * @property {string} tag Empty if it has none.
+ * @property {string} bridge Empty if it has none.
+ * @property {number | null} charge In percent; null if it is unknown.
+ * @property {number} added The place among the robots as they were added.
+ */
+
+/** With more robots than this, the list has the worst first. */
+export const MANY = 8;
+
+/** @type {Choice} */
+export const AT_FIRST = { order: "auto", group: "none", states: [] };
+
+/** `Robot 2` comes before `Robot 10`. */
+const natural = new Intl.Collator(undefined, { numeric: true });
+
+/** @type {Record<Order, (one: Listed, other: Listed) => number>} */
+const COMPARE = {
+  auto: () => 0,
+  added: () => 0,
+  name: () => 0,
+  state: (one, other) => one.rank - other.rank,
+  battery: (one, other) => (one.charge ?? Infinity) - (other.charge ?? Infinity) || 0,
+};
+
+/**
+ * @param {Order} order
+ * @param {number} count Number of robots.
+ * @returns {Order} The order that is used.
+ */
+export function orderFor(order, count) {
+  if (order !== "auto") return order;
+  return count > MANY ? "state" : "added";
+}
+
+/**
+ * Return the robots in order, with the name of each group before its robots.
+ *
+ * @template {Listed} T
+ * @param {T[]} robots
+ * @param {Choice} choice
+ * @returns {{name: string, robots: T[]}[]} One group without a name if there are none.
+ */
+export function arranged(robots, { order, group }) {
+  const used = orderFor(order, robots.length);
+  const byName = (/** @type {T} */ one, /** @type {T} */ other) =>
+    used === "added" ? 0 : natural.compare(one.name, other.name);
+  const sorted = [...robots].sort(
+    (one, other) => COMPARE[used](one, other) || byName(one, other) || one.added - other.added,
+  );
+  if (group === "none") return [{ name: "", robots: sorted }];
+  /** @type {Map<string, T[]>} */
+  const groups = new Map();
+  for (const robot of sorted) {
+    const key = robot[group];
+    groups.set(key, [...(groups.get(key) ?? []), robot]);
+  }
+  const names = [...groups.keys()].sort(
+    (one, other) => Number(one === "") - Number(other === "") || natural.compare(one, other),
+  );
+  return names.map((name) => ({
+    name: name || `No ${group}`,
+    robots: groups.get(name) ?? [],
+  }));
+}
+
+/**
+ * Return how many robots are in each group of states.
+ *
+ * @param {Listed[]} robots
+ * @param {string[]} always Groups that are listed even without a robot.
+ * @returns {{group: string, count: number}[]} The worst first, those without a robot
+ *     last.
+ */
+export function countsOf(robots, always) {
+  const worst = [...robots].sort((one, other) => one.rank - other.rank);
+  const counts = new Map(worst.map(({ group }) => [group, 0]));
+  for (const { group } of robots) counts.set(group, (counts.get(group) ?? 0) + 1);
+  for (const group of always) if (!counts.has(group)) counts.set(group, 0);
+  return [...counts].map(([group, count]) => ({ group, count }));
+}
+
+/**
+ * @param {Listed} robot
+ * @param {string} wanted Part of the name.
+ * @param {string[]} states
+ */
+export function isShown({ name, group }, wanted, states) {
+  const named = name.toLowerCase().includes(wanted.trim().toLowerCase());
+  return named && (states.length === 0 || states.includes(group));
+}

@@ -1,0 +1,160 @@
+/** The addresses of the server that this page belongs to, and the page's key to it. */
+
+import { CODE, FOLDER, KEY, PAGE_ID, PROTOCOL } from "./constants.js";
+
+/** The URL below which WebMap serves its own files of this version. */
+export const OWN_FILES = new URL("..", import.meta.url);
+
+/** The URL below which WebMap serves files and sockets; its own files, of any version. */
+export const BASE = new URL(/\/v-\w+\/$/.test(OWN_FILES.pathname) ? ".." : ".", OWN_FILES);
+
+/**
+ * Resolve an address from the server to a file of the page.
+ *
+ * @param {string} address Those that begin with "/_webmap/" are below every prefix.
+ * @param {string | URL} base The base of other addresses.
+ * @returns {string | null} null if it is on another origin.
+ */
+export function resolve(address, base) {
+  const ours = address.startsWith(FOLDER);
+  try {
+    const url = ours ? new URL(address.slice(FOLDER.length), BASE) : new URL(address, base);
+    const web = url.protocol === "http:" || url.protocol === "https:";
+    return web && url.origin === BASE.origin ? url.href : null;
+  } catch {
+    return null;
+  }
+}
+
+/**
+ * @param {string} path Below {@link BASE}.
+ * @param {Record<string, string>} query
+ * @returns {URL} The address of a socket.
+ */
+export function socketAddress(path, query) {
+  const url = new URL(path, BASE);
+  url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+  url.search = new URLSearchParams(query).toString();
+  return url;
+}
+
+/** @returns {string} The path of this page, from the application's root. */
+export function pagePath() {
+  const root = new URL("..", BASE).pathname;
+  const path = decodeURI(location.pathname);
+  return path.startsWith(root) ? `/${path.slice(root.length)}` : path;
+}
+
+/**
+ * The storage belongs to one origin, so a server on another port of the same host,
+ * which receives WebMap's cookie, cannot read the key. WebMap may have several prefixes
+ * there.
+ */
+const NAME = `webmap key ${BASE.pathname}`;
+
+/** The key of this page; a browser may block its storage. */
+let received = "";
+
+/** Store the key that the server sent to this page, and clean the address bar. */
+export function takeKey() {
+  const element = document.querySelector(`meta[name="${KEY}"]`);
+  if (element instanceof HTMLMetaElement) {
+    received = element.content;
+    element.remove();
+    try {
+      localStorage.setItem(NAME, received);
+    } catch {
+      // The key works until the page is left.
+    }
+  }
+  const url = new URL(location.href);
+  if (!url.searchParams.has(CODE)) return;
+  url.searchParams.delete(CODE);
+  history.replaceState(history.state, "", url);
+}
+
+/** @returns {string} The newest key, which another tab may have received. */
+function key() {
+  try {
+    return localStorage.getItem(NAME) ?? received;
+  } catch {
+    return received;
+  }
+}
+
+/** @param {() => void} fn Called when another tab receives a new key. */
+export function onSignIn(fn) {
+  addEventListener("storage", (event) => {
+    if (event.key === NAME) fn();
+  });
+}
+
+/** @returns {string[]} Subprotocols: the only header that a page can set. */
+export function protocols() {
+  return key() ? [PROTOCOL, key()] : [PROTOCOL];
+}
+
+/**
+ * Ask the server why a socket was refused: a browser does not report the reason.
+ *
+ * @returns {Promise<string>} A sentence; empty if the server gives no reason.
+ */
+export async function whyRefused() {
+  try {
+    const headers = key() ? { [KEY]: key() } : undefined;
+    const answer = await fetch(new URL("key", BASE), { method: "POST", headers });
+    if (![401, 403, 421].includes(answer.status)) return "";
+    return (await answer.text()).split("\n\n")[1]?.trim() ?? "";
+  } catch {
+    return ""; // There is no server.
+  }
+}
+
+/**
+ * Take the name that identifies this page's maps after a reload.
+ *
+ * It is in the session storage only while the page is being left: a duplicated tab
+ * would else copy the name, and two pages cannot have the same name.
+ *
+ * @param {string} path
+ * @returns {string}
+ */
+export function takeIdentity(path) {
+  const entry = `webmap ${path}`;
+  const name = take(entry) ?? newIdentity();
+  addEventListener("pagehide", () => put(entry, name));
+  addEventListener("pageshow", () => take(entry));
+  return name;
+}
+
+function newIdentity() {
+  const bytes = crypto.getRandomValues(new Uint8Array(16));
+  return Array.from(bytes, (byte) => byte.toString(16).padStart(2, "0")).join("");
+}
+
+/**
+ * @param {string} entry
+ * @returns {string | null}
+ */
+function take(entry) {
+  try {
+    const name = sessionStorage.getItem(entry);
+    sessionStorage.removeItem(entry);
+    return name && new RegExp(PAGE_ID).test(name) ? name : null;
+  } catch {
+    // A browser may block its storage; a reload then has a new name.
+    return null;
+  }
+}
+
+/**
+ * @param {string} entry
+ * @param {string} name
+ */
+function put(entry, name) {
+  try {
+    sessionStorage.setItem(entry, name);
+  } catch {
+    // As above.
+  }
+}
