@@ -6,7 +6,7 @@ from typing import Any
 
 from webmap.ros.rosbridge.server.encode import Publication
 from webmap.ros.rosbridge.server.graph import GoalHandle, Respond
-from webmap.sim.graph_node import Node
+from webmap.sim.messages import Node
 from webmap.sim.navigator import Goal, GoalState
 
 _ACTIONLIB_STATUS = {

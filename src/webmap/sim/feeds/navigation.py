@@ -12,10 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from webmap.base.geometry import Pose
-from webmap.sim.feeds.feed import Feed
-from webmap.sim.graph_node import Node
-from webmap.sim.messages import Message, float32, vector
-from webmap.sim.obstacles import Obstacles
+from webmap.sim.maps import Obstacles
+from webmap.sim.messages import Feed, Message, Node, float32, vector
 
 LETHAL, INSCRIBED, UNKNOWN = 100, 99, -1
 INFLATION = 0.55
