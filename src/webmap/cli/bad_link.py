@@ -11,7 +11,7 @@ import click
 from webmap.cli.options import Finite
 
 if TYPE_CHECKING:
-    from webmap.sim.proxy import FaultProxy
+    from webmap.testing.fault_proxy import FaultProxy
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -71,7 +71,7 @@ def bad_link(url: str, delay: float, jitter: float, stall: float) -> Iterator[st
     if port is None or not (delay or jitter or stall):
         yield url
         return
-    from webmap.sim.proxy import FaultProxy, Shape
+    from webmap.testing.fault_proxy import FaultProxy, Shape
 
     with FaultProxy(port) as proxy:
         proxy.shape(Shape(latency=delay / 1000, jitter=jitter / 1000))
