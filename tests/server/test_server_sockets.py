@@ -15,8 +15,8 @@ from websockets.frames import Frame, Opcode
 
 from webmap.server.access import Settings
 from webmap.server.app import WebApp
-from webmap.server.drive_socket import MOST_STOP_ONLY
 from webmap.server.page_socket import OPENS_AT_ONCE, REPLACED, TOO_SOON
+from webmap.server.sockets import MOST_STOP_ONLY
 
 TICK = '{"op":"tick","tick":%d,"ack":-1}'
 
