@@ -9,10 +9,10 @@ from contextlib import contextmanager
 import pytest
 from rosbags.highlevel import AnyReader
 
+from equipment.webmap_process import simulator
+from equipment.webmap_process import webmap as running
 from webmap.agents import address as keys
 from webmap.agents.peer import Peer, User
-from webmap_process import simulator
-from webmap_process import webmap as running
 
 pytest.importorskip("zenoh")
 pytestmark = pytest.mark.slow

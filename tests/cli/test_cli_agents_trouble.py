@@ -13,12 +13,12 @@ import msgspec
 import psutil
 import pytest
 
+from equipment.webmap_process import simulator, webmap
 from webmap.agents import address
 from webmap.agents.description import PROTOCOL, Beacon
 from webmap.agents.link import AgentLane
 from webmap.agents.peer import Peer, User, close_peers, peer_of
 from webmap.ros.rosbridge import ops
-from webmap_process import simulator, webmap
 
 pytest.importorskip("zenoh")
 

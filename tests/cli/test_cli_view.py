@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from equipment.webmap_process import simulator
 from webmap import Bridge
 from webmap.console import Console, make_robot
 from webmap.core.layer import Layer
@@ -23,7 +24,6 @@ from webmap.fleet.given import Candidate
 from webmap.fleet.overrides import Overrides, parse_setting
 from webmap.fleet.shown import ShownRobots
 from webmap.fleet.watch import LookingForLayers
-from webmap_process import simulator
 
 pytestmark = pytest.mark.slow
 

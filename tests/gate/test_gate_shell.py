@@ -5,9 +5,9 @@ import contextlib
 import json
 
 import pytest
-from gate_harness import spec
 from link_bench import in_loop, noting_bridge, until
 
+from equipment.gate_harness import spec
 from webmap.gate import actions, commands, events, protocol, shell
 from webmap.gate.disk import UNKNOWN, Disk, Records, path_of
 from webmap.gate.events import Key, Press

@@ -13,7 +13,7 @@ from webmap.ros.tf.track import MOST, Track
 
 # The fake rosbridge is in the folder of the bridge's tests.
 sys.path.append(str(Path(__file__).parents[1] / "ros"))
-from fake_rosbridge import bridged, until
+from equipment.fake_rosbridge import bridged, until
 
 COUNT = 2000
 LEVEL = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
-from processes import WEB, reset, running
 from safety_bench import wait_for
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from real_browser import watched_tab
+from equipment.chromium import watched_tab
+from equipment.processes import WEB, reset, running
 from webmap.gate.display.client import GateClient
 from webmap.gate.protocol import RobotSpec
 from webmap.testing import Sentinel, WitnessRobot

@@ -9,8 +9,8 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import pytest
-from server_fakes import FakeGate, FakeModel, FakePage, FakeSite
 
+from equipment.server_fakes import FakeGate, FakeModel, FakePage, FakeSite
 from webmap.base.errors import ConfigError
 from webmap.server import application, runner
 from webmap.server.app import WebApp

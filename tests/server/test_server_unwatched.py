@@ -6,9 +6,9 @@ import pytest
 from page_loop import make_model, open_page, wait_for
 
 import webmap
+from equipment.webmap_process import simulator
 from webmap.base import looking as looking_module
 from webmap.base.looking import looking
-from webmap_process import simulator
 
 
 @pytest.fixture

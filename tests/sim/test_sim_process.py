@@ -16,8 +16,8 @@ import pytest
 from simulated import room, running
 from websockets.asyncio.client import connect
 
-from captured_frames import PLAYER, frame_file, played
-from frame_player import load_recording
+from equipment.captured_frames import PLAYER, frame_file, played
+from equipment.frame_player import load_recording
 from webmap.base.errors import ConfigError
 from webmap.ros.rosbridge.server.dialect import Dialect
 from webmap.ros.rosbridge.server.encode import Encoder

@@ -48,8 +48,7 @@ class Bench:
         self._open = contextlib.ExitStack()
 
     def __enter__(self):
-        from server_fakes import running
-
+        from equipment.server_fakes import running
         from webmap.core.page import Viewer
 
         def authenticate(scope):

@@ -11,12 +11,12 @@ from types import SimpleNamespace
 import pytest
 from button_robot import robot_node
 
+from equipment.webmap_process import simulator
 from webmap import Bridge, Robot
 from webmap.base.errors import ConfigError
 from webmap.config.buttons import ButtonMistake, read_button
 from webmap.core.page import Page, PageEntry
 from webmap.scene.element import Event
-from webmap_process import simulator
 
 DOCK = {"label": "Dock", "service": "/dock", "type": "std_srvs/Trigger"}
 HORN = {
