@@ -31,7 +31,7 @@ Discs = Sequence[tuple[float, float, float]]
 
 
 class GoalState(Enum):
-    """State of a goal."""
+    """State of a goal; the values are words of the log."""
 
     ACTIVE = "active"
     SUCCEEDED = "succeeded"
@@ -52,7 +52,7 @@ class Goal:
         self._on_end = on_end
 
     def end(self, state: GoalState, text: str) -> None:
-        """End the goal, once."""
+        """Set the last state and its reason, and call back; later calls do nothing."""
         if self.state is GoalState.ACTIVE:
             self.state, self.text = state, text
             if self._on_end:

@@ -214,7 +214,7 @@ class CostmapTopics:
         return Costs(world.obstacles, world.options.base.radius)
 
     def start(self) -> None:
-        """Advertise the topics."""
+        """Advertise the local and the global costmap of each robot, with updates."""
         for robot in self._node.world.robots:
             for part in ("local_costmap", "global_costmap"):
                 topic = self._topic(robot.topics, part)
