@@ -78,7 +78,7 @@ def test_each_module_of_webmap_is_served_once_and_a_page_starts_with_few():
     served = served_modules(sources)
     texts = {name: text for name, text in served.items() if name.endswith(".js")}
     for name in sources:
-        where = [key for key, text in texts.items() if f'["{name}"] = (' in text]
+        where = [key for key, text in texts.items() if f'["{name}"] ??= (' in text]
         assert len(where) == 1, name
     loaded, todo = set(), list(STARTS)
     while todo:
@@ -131,20 +131,20 @@ def test_modules_that_a_page_does_not_start_with_are_served_as_one():
     served = served_modules(FEW, ["start.js"])
     assert served[PARTS] == (
         'import { $modules } from "./start.js";\n'
-        '$modules["x/own.js"] = (() => {\n'
+        '$modules["x/own.js"] ??= (() => {\n'
         'const {\n  a,\n  b: c,\n} = $modules["both.js"];\n'
         "\nclass own {}\n"
         "\nreturn { own };\n})();\n"
-        '$modules["tool.js"] = (() => {\n'
+        '$modules["tool.js"] ??= (() => {\n'
         "async function tool() {}\n"
         "\nreturn { tool };\n})();\n"
-        '$modules["x/one.js"] = (() => {\n'
+        '$modules["x/one.js"] ??= (() => {\n'
         'const { b } = $modules["both.js"];\n'
         'const { own } = $modules["x/own.js"];\n'
         'const { tool } = $modules["tool.js"];\n'
         "function attach() {}\n"
         "\nreturn { default: attach };\n})();\n"
-        '$modules["x/two.js"] = (() => {\n'
+        '$modules["x/two.js"] ??= (() => {\n'
         'const { tool } = $modules["tool.js"];\nclass Two {}\n'
         "\nreturn { default: Two };\n})();\n"
         "export { $modules };\n"
@@ -169,6 +169,28 @@ def test_the_address_of_a_module_within_another_has_the_same_exports():
     assert set(served) - set(FEW) == {PARTS, PARTS + ".map", "start.js.map"}
 
 
+def test_a_module_is_one_instance_for_users_and_in_a_bundle_that_is_loaded_twice(
+    tmp_path,
+):
+    for name, text in served_modules(FEW, ["start.js"]).items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    (tmp_path / "package.json").write_text('{"type": "module"}')
+    (tmp_path / "user.js").write_text(
+        'import { own } from "./x/own.js";\n'
+        'const loads = ["./parts.js", "./parts.js?again=1"].map((at) => import(at));\n'
+        "for (const { $modules } of await Promise.all(loads)) {\n"
+        '  console.log($modules["x/own.js"].own === own);\n'
+        "}\n"
+    )
+    node = shutil.which("node")
+    assert node, "node is needed to test the browser's modules"
+    done = subprocess.run(
+        [node, tmp_path / "user.js"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["true", "true"]
+
+
 def declared():
     """Return the modules and style sheets of all browser parts in Python."""
     texts = [path.read_text("utf-8") for path in PACKAGE.rglob("*.py")]
@@ -189,7 +211,7 @@ def test_all_declared_browser_parts_are_served_with_their_styles():
         if name.endswith(".js"):
             assert name.startswith(PART_FOLDERS), name
             bundle = modules[FIRST_PARTS.get(name, PARTS)]
-            assert f'$modules["{name}"] = (' in bundle, name
+            assert f'$modules["{name}"] ??= (' in bundle, name
         elif name.removesuffix(".css") + ".js" not in FIRST_PARTS:
             own = re.sub("@import.*", "", sheets[name]).strip()
             assert own in sheets[PART_SHEETS], name

@@ -4,9 +4,9 @@ A page of many small modules waits for one round trip after another, and each re
 costs the browser some milliseconds. So a page loads the bundles of :data:`STARTS` and
 :data:`PARTS`: each has some modules in the order of their imports, every module in a
 function of its own. One object ``$modules`` has the exports of all by name. So every
-module is one instance: at the address of a module within a bundle is a module that
-exports the same objects, for modules of users. The style sheets of features are served
-as one too.
+module is one instance, also if a page loads a bundle again after a failure: at the
+address of a module within a bundle is a module that exports the same objects, for
+modules of users. The style sheets of features are served as one too.
 
 Comments on lines of their own are left out, and their lines stay empty, so that lines
 have the same numbers everywhere. A source map has the sources as they were written; a
@@ -121,7 +121,7 @@ def _bundle(bundle: str, sources: Mapping[str, str], before: str) -> tuple[str, 
     text = _import(before, bundle) if before else "const $modules = {};\n"
     sections = []
     for name, source in sources.items():
-        text += f'$modules["{name}"] = (() => {{\n'
+        text += f'$modules["{name}"] ??= (() => {{\n'
         # Each line is that line of the source: the same column, the next line.
         origin = {
             "version": 3,
