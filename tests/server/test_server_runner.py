@@ -47,7 +47,7 @@ print("ended", flush=True)
 def process():
     """A process that serves; at its end, its output and log are shown."""
     child = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, str(Path(__file__).parent), TOKEN],
+        [sys.executable, "-c", PROGRAM, str(Path(__file__).parents[1]), TOKEN],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
