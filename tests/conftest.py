@@ -13,16 +13,16 @@ import pytest
 from hypothesis import HealthCheck, settings
 from playwright.sync_api import Browser, expect
 
-from command_fixtures import later_port, ros1, ros2
-from real_browser import launched
-from surroundings import use_own_surroundings
+from equipment.chromium import launched
+from equipment.environment import use_own_environment
+from equipment.simulator_fixtures import later_port, ros1, ros2
 from thorough import is_thorough
 from webmap.base.logs import budgets
 
 __all__ = ["later_port", "ros1", "ros2"]
 """Fixtures from another file."""
 
-use_own_surroundings()
+use_own_environment()
 
 # Else each run of pytest compiles all tests again.
 sys.dont_write_bytecode = False

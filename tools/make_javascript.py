@@ -19,8 +19,8 @@ from webmap.ros.messages_log import LEVELS
 from webmap.scene.wire.messages import LONGEST_TEXTS, MOST_UNSEEN, PAGE_ID
 from webmap.scene.wire.opcodes import TABLES, VERSION
 from webmap.server.access import CODE, KEY, PROTOCOL
+from webmap.server.bundles import FIRST_PARTS, PART_FOLDERS, PART_SHEETS, PARTS
 from webmap.server.html import FOLDER
-from webmap.server.modules import PART_FOLDERS, PART_SHEETS, PARTS
 from webmap.server.page_socket import BROKEN_RULE, REPLACED
 
 WEB = Path(__file__).parent.parent / "src/webmap/web"
@@ -55,8 +55,12 @@ def constants_js() -> str:
     """Return the text of ``constants.js``."""
     constants = {
         "FOLDER": (FOLDER, "The path of WebMap's own files and sockets on the server."),
-        "PARTS": (PARTS, "The module with all of WebMap's own browser parts."),
+        "PARTS": (PARTS, "The bundle with WebMap's other browser parts."),
         "PART_FOLDERS": (list(PART_FOLDERS), "Where their own modules are."),
+        "FIRST_PARTS": (
+            FIRST_PARTS,
+            "The bundle of each browser part that a page starts with.",
+        ),
         "PART_SHEETS": (PART_SHEETS, "The style sheet of these parts."),
         "PROTOCOL": (PROTOCOL, "The subprotocol of both sockets."),
         "CODE": (CODE, "The field of a query that signs in once."),

@@ -3,7 +3,7 @@
 import msgspec
 import pytest
 
-from camera_server import a_jpeg
+from equipment.camera_server import a_jpeg
 from webmap.agents import camera_messages
 from webmap.agents.address import Sender, camera_key
 from webmap.agents.agent_cameras import (

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bag_making import Made
+from equipment.bag_files import Made
 
 
 @pytest.fixture(scope="module", params=["ros1", "ros2"])

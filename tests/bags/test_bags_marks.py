@@ -2,7 +2,7 @@
 
 import pytest
 
-from bag_making import ODOMETRY, Made
+from equipment.bag_files import ODOMETRY, Made
 from webmap.bags import marks as marks_module
 from webmap.bags.marks import MarkFinder, find_marks
 

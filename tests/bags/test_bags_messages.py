@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rosbags.typesys import get_types_from_msg
 
-from bag_making import BEGIN, Made, types_of
+from equipment.bag_files import BEGIN, Made, types_of
 from webmap.bags.recording import Recording
 from webmap.bags.times import Stamps
 from webmap.bags.types import MessageConverter, texts_of

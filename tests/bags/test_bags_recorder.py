@@ -6,7 +6,7 @@ import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability
 
-from bag_making import BEGIN, FRAMES, GRID, ODOMETRY, Made, types_of
+from equipment.bag_files import BEGIN, FRAMES, GRID, ODOMETRY, Made, types_of
 from webmap.bags.recorder import Recorder, new_bag
 from webmap.base.errors import ConfigError
 

@@ -8,7 +8,7 @@ from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 
-from bag_making import BEGIN, FRAMES, GRID, ODOMETRY, TWIST, Made, types_of
+from equipment.bag_files import BEGIN, FRAMES, GRID, ODOMETRY, TWIST, Made, types_of
 from webmap.bags.recording import Recording, recording_name
 from webmap.base.errors import ConfigError
 

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 from played_bag import NOW, Client, played, until, xs
 
-from bag_making import BEGIN, FRAMES, GRID, ODOMETRY, TWIST
+from equipment.bag_files import BEGIN, FRAMES, GRID, ODOMETRY, TWIST
 from webmap.bags import player as player_module
 from webmap.bags.playback import MARKS, STATUS
 from webmap.bags.player import REFUSED, Player

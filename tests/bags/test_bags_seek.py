@@ -6,7 +6,7 @@ import msgspec
 import pytest
 from played_bag import Client, played, until, xs
 
-from bag_making import BEGIN, FRAMES, GRID, ODOMETRY
+from equipment.bag_files import BEGIN, FRAMES, GRID, ODOMETRY
 from webmap.bags import player as player_module
 from webmap.bags.playback import MARKS, STATUS
 from webmap.bags.recording import Recording

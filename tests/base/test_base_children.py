@@ -10,7 +10,7 @@ import psutil
 import pytest
 
 import webmap
-from bag_making import ODOMETRY, Made
+from equipment.bag_files import ODOMETRY, Made
 from webmap.base.processes import python_command
 from webmap.cli.demo import simulator
 from webmap.cli.play import replay

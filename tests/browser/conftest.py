@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 from playwright.sync_api import Browser, Page
 
-from real_browser import watched_tab
+from equipment.chromium import watched_tab
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from playwright.sync_api import Browser, Page
 
-from real_browser import watched_tab
+from equipment.chromium import watched_tab
 
 HERE = Path(__file__).parent
 RECORDINGS = HERE / "drawn"

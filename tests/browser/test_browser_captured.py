@@ -12,9 +12,9 @@ from contextlib import contextmanager
 import cbor2
 import pytest
 from playwright.sync_api import expect
-from processes import BRIDGE, WEB, Process, matrix, running
 
-from captured_frames import PLAYER, frame_file, played
+from equipment.captured_frames import PLAYER, frame_file, played
+from equipment.processes import BRIDGE, WEB, Process, matrix, running
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

@@ -5,9 +5,9 @@ import io
 import pytest
 from PIL import Image
 from playwright.sync_api import expect
-from processes import WEB, running, wait_until
 
-from real_browser import watched_tab
+from equipment.chromium import watched_tab
+from equipment.processes import WEB, running, wait_until
 
 pytestmark = pytest.mark.browser
 

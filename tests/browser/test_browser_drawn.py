@@ -3,11 +3,11 @@
 import pytest
 from drawn_pictures import CONSOLE, expect_drawn, opened, robots
 from fixed_site import LATCHED, site
-from processes import BRIDGE, running, serving
 
-from bag_making import Made
-from captured_frames import PLAYER, played
-from webmap_process import simulator, webmap
+from equipment.bag_files import Made
+from equipment.captured_frames import PLAYER, played
+from equipment.processes import BRIDGE, running, serving
+from equipment.webmap_process import simulator, webmap
 
 # On a busy machine the pages may show for a long time that links are slow.
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(600)]

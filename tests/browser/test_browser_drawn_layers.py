@@ -7,7 +7,7 @@ from fixed_bridge import FixedBridge, fixed_bridge
 from fixed_site import STEPS
 from playwright.sync_api import Page, expect
 
-from webmap_process import page_of, webmap
+from equipment.webmap_process import page_of, webmap
 
 # On a busy machine the pages may show for a long time that links are slow.
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.timeout(600)]

@@ -9,7 +9,10 @@ from contextlib import contextmanager
 import pytest
 import roslibpy
 from playwright.sync_api import expect
-from processes import (
+from robots import Witness
+
+from equipment.chromium import hold
+from equipment.processes import (
     BRIDGE,
     matrix,
     place_on_screen,
@@ -17,9 +20,6 @@ from processes import (
     serving,
     wait_until,
 )
-from robots import Witness
-
-from real_browser import hold
 
 pytestmark = pytest.mark.browser
 

@@ -2,8 +2,8 @@
 
 import pytest
 from playwright.sync_api import expect
-from processes import WEB, running
 
+from equipment.processes import WEB, running
 from webmap.testing.witness import WitnessRobot
 
 pytestmark = pytest.mark.browser

@@ -5,10 +5,10 @@ import subprocess
 import sys
 
 import pytest
-from processes import BRIDGE, running, wait_until
 from robots import Witness
 
-from real_browser import hold
+from equipment.chromium import hold
+from equipment.processes import BRIDGE, running, wait_until
 
 pytestmark = pytest.mark.browser
 

@@ -6,10 +6,10 @@ import signal
 
 import pytest
 from playwright.sync_api import expect
-from processes import BRIDGE, WEB, running, wait_until
 from robots import Witness
 
-from real_browser import hold
+from equipment.chromium import hold
+from equipment.processes import BRIDGE, WEB, running, wait_until
 
 pytestmark = pytest.mark.browser
 

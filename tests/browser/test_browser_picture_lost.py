@@ -5,9 +5,9 @@ import threading
 
 import pytest
 from playwright.sync_api import expect
-from processes import WEB, running, wait_until
 
-from real_browser import hold
+from equipment.chromium import hold
+from equipment.processes import WEB, running, wait_until
 
 pytestmark = pytest.mark.browser
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
-from processes import BRIDGE, WEB, running
 from robots import Witness
 
-from real_browser import hold
+from equipment.chromium import hold
+from equipment.processes import BRIDGE, WEB, running
 
 pytestmark = pytest.mark.browser
 

@@ -4,7 +4,8 @@ from urllib.parse import urlsplit
 
 import pytest
 from playwright.sync_api import expect
-from processes import WEB, running
+
+from equipment.processes import WEB, running
 
 pytestmark = pytest.mark.browser
 

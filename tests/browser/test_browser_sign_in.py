@@ -6,7 +6,8 @@ import time
 
 import pytest
 from playwright.sync_api import expect
-from processes import WEB, running
+
+from equipment.processes import WEB, running
 
 pytestmark = pytest.mark.browser
 

@@ -5,8 +5,8 @@ from contextlib import ExitStack
 
 import pytest
 from playwright.sync_api import expect
-from processes import WEB, running, wait_until
 
+from equipment.processes import WEB, running, wait_until
 from webmap.testing.witness import WitnessRobot
 
 pytestmark = pytest.mark.browser

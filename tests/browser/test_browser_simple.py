@@ -4,11 +4,19 @@ import math
 from contextlib import suppress
 
 import pytest
-from devtools import Chromium
-from processes import BRIDGE, EXAMPLES, WEB, matrix, reset, running, wait_until
 from robots import Witness
 
-from real_browser import hold
+from equipment.chromium import hold
+from equipment.devtools import Chromium
+from equipment.processes import (
+    BRIDGE,
+    EXAMPLES,
+    WEB,
+    matrix,
+    reset,
+    running,
+    wait_until,
+)
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

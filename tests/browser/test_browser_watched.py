@@ -3,7 +3,7 @@
 import pytest
 from playwright.sync_api import Page
 
-from real_browser import watched_tab
+from equipment.chromium import watched_tab
 
 pytestmark = pytest.mark.browser
 

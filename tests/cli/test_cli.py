@@ -10,7 +10,7 @@ import time
 import pytest
 
 import webmap
-from cli_inside import run_inside
+from equipment.command_line import run_inside
 
 pytestmark = pytest.mark.slow
 

@@ -10,7 +10,8 @@ import msgspec
 import psutil
 import pytest
 
-from cli_inside import run_inside
+from equipment.command_line import run_inside
+from equipment.webmap_process import simulator, webmap
 from webmap.agents import address
 from webmap.agents.announcements import PROTOCOL, Beacon, read_about
 from webmap.agents.peer import Peer
@@ -21,7 +22,6 @@ from webmap.fleet.agent import (
     parse_rates,
 )
 from webmap.ros.asking import ask_topics
-from webmap_process import simulator, webmap
 
 pytest.importorskip("zenoh")
 

@@ -6,10 +6,10 @@ from contextlib import contextmanager
 import pytest
 from playwright.sync_api import expect
 
-from camera_server import CameraServer
-from real_browser import end_stops, hold, watched_tab
+from equipment.camera_server import CameraServer
+from equipment.chromium import end_stops, hold, watched_tab
+from equipment.webmap_process import page_of, simulator, webmap
 from webmap.base.tasks import LoopThread
-from webmap_process import page_of, simulator, webmap
 
 pytest.importorskip("zenoh")
 pytestmark = [pytest.mark.browser, pytest.mark.slow]

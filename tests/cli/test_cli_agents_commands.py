@@ -9,11 +9,11 @@ from contextlib import contextmanager
 import pytest
 from rosbags.highlevel import AnyReader
 
+from equipment.webmap_process import simulator
+from equipment.webmap_process import webmap as running
 from webmap.agents import address as keys
 from webmap.agents.peer import Peer
 from webmap.agents.router_access import RouterUser
-from webmap_process import simulator
-from webmap_process import webmap as running
 
 pytest.importorskip("zenoh")
 pytestmark = pytest.mark.slow

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from camera_server import CameraServer
+from equipment.camera_server import CameraServer
+from equipment.webmap_process import simulator, webmap
 from webmap.base.tasks import LoopThread
-from webmap_process import simulator, webmap
 
 pytest.importorskip("zenoh")
 

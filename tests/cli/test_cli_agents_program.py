@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from webmap_process import simulator, webmap
+from equipment.webmap_process import simulator, webmap
 
 pytest.importorskip("zenoh")
 pytestmark = pytest.mark.slow

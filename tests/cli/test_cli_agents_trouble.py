@@ -13,13 +13,13 @@ import msgspec
 import psutil
 import pytest
 
+from equipment.webmap_process import simulator, webmap
 from webmap.agents import address
 from webmap.agents.announcements import PROTOCOL, Beacon
 from webmap.agents.link import AgentConnection
 from webmap.agents.peer import Peer, close_peers, peer_of
 from webmap.agents.router_access import RouterUser
 from webmap.ros.rosbridge import ops
-from webmap_process import simulator, webmap
 
 pytest.importorskip("zenoh")
 

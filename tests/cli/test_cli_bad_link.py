@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from cli_inside import run_inside
+from equipment.command_line import run_inside
 from webmap.cli import demo
 
 

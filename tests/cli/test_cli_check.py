@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from cli_inside import run_inside
+from equipment.command_line import run_inside
 
 pytestmark = pytest.mark.slow
 

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from webmap_process import simulator
+from equipment.webmap_process import simulator
 
 pytestmark = pytest.mark.slow
 

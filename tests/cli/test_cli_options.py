@@ -6,7 +6,7 @@ import tomllib
 
 import pytest
 
-from cli_inside import run_inside
+from equipment.command_line import run_inside
 from webmap.base.errors import ConfigError
 from webmap.cli.options import parse_topics
 

@@ -8,8 +8,8 @@ import sys
 import psutil
 import pytest
 
-from bag_making import ODOMETRY, TWIST, Made
-from cli_inside import run_inside
+from equipment.bag_files import ODOMETRY, TWIST, Made
+from equipment.command_line import run_inside
 from webmap.bags import need_rosbags
 from webmap.bags.playback import PlaybackCommand
 from webmap.base.errors import ConfigError

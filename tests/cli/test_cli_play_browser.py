@@ -5,8 +5,8 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from bag_making import FRAMES, GRID, ODOMETRY, TWIST, Made
-from cli_shown import shown
+from equipment.bag_files import FRAMES, GRID, ODOMETRY, TWIST, Made
+from equipment.console_page import shown
 
 pytestmark = pytest.mark.browser
 

@@ -6,8 +6,8 @@ from contextlib import contextmanager
 import pytest
 from playwright.sync_api import expect
 
-from bag_making import FRAMES, ODOMETRY, Made
-from cli_shown import shown
+from equipment.bag_files import FRAMES, ODOMETRY, Made
+from equipment.console_page import shown
 
 pytestmark = pytest.mark.browser
 

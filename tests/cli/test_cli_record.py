@@ -14,9 +14,9 @@ from rosbags.highlevel import AnyReader
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from cli_inside import run_inside
+from equipment.command_line import run_inside
+from equipment.webmap_process import simulator
 from webmap.cli.play import replay
-from webmap_process import simulator
 
 pytestmark = pytest.mark.slow
 

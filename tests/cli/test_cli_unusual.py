@@ -7,8 +7,8 @@ import sys
 import pytest
 from playwright.sync_api import expect
 
-from real_browser import end_stops, watched_tab
-from unusual import unusual
+from equipment.chromium import end_stops, watched_tab
+from equipment.environment import unusual_environment
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -22,7 +22,7 @@ def url(tmp_path):
         [*command, "--port", "0", "--no-browser"],
         stdout=subprocess.PIPE,
         text=True,
-        env=unusual(tmp_path) | state,
+        env=unusual_environment(tmp_path) | state,
         umask=0o077,
     ) as demo:
         yield re.search(r"ready at (\S+)", demo.stdout.readline())[1]

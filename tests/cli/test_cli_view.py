@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from equipment.webmap_process import simulator
 from webmap import Bridge
 from webmap.console import Console, make_robot
 from webmap.core.layer import Layer
@@ -23,7 +24,6 @@ from webmap.fleet.periodic_search import LayerSearch
 from webmap.fleet.robot_options import Candidate
 from webmap.fleet.search import find_fleet
 from webmap.fleet.view_robots import ViewRobots
-from webmap_process import simulator
 
 pytestmark = pytest.mark.slow
 

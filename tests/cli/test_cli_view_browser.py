@@ -7,8 +7,8 @@ import pytest
 from playwright.sync_api import expect
 from websockets.sync.client import connect
 
-from cli_shown import shown
-from webmap_process import simulator
+from equipment.console_page import shown
+from equipment.webmap_process import simulator
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

@@ -14,7 +14,7 @@ import pytest
 from console_ready import wait_until_ready
 from playwright.sync_api import Browser, Page, expect
 
-from real_browser import Complaints
+from equipment.chromium import Complaints
 
 SIZES = {
     "desk": {"viewport": {"width": 1280, "height": 800}},

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
-from real_browser import hold
+from equipment.chromium import hold
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

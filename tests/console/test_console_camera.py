@@ -11,8 +11,8 @@ import pytest
 from console_ready import wait_until_ready
 from playwright.sync_api import Page, expect
 
-from camera_server import CameraServer
-from real_browser import Complaints, hold
+from equipment.camera_server import CameraServer
+from equipment.chromium import Complaints, hold
 from webmap.base.tasks import LoopThread
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]

@@ -12,7 +12,7 @@ import pytest
 from console_ready import wait_until_ready
 from playwright.sync_api import Browser, Page, Route
 
-from webmap.server.modules import STARTS
+from webmap.server.bundles import STARTS
 from webmap.server.own_files import own_files
 
 pytestmark = pytest.mark.browser
@@ -21,7 +21,7 @@ ROBOTS = 1
 
 MOST_REQUESTS = 20
 MOST_BYTES = 110_000
-"""The limits until the first robot is shown. The page needs about 14 requests and 97 kB
+"""The limits until the first robot is shown. The page needs about 12 requests and 97 kB
 with the images of the map."""
 
 MOST_REQUESTS_IN_ALL = 20

@@ -5,8 +5,8 @@ import re
 import pytest
 from playwright.sync_api import expect
 
-from real_browser import watched_tab
-from webmap_process import webmap
+from equipment.chromium import watched_tab
+from equipment.webmap_process import webmap
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

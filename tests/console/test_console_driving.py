@@ -7,7 +7,7 @@ import pytest
 from console_ready import assert_free, expect_state, select, send_away, title, unfold
 from playwright.sync_api import expect
 
-from real_browser import hold
+from equipment.chromium import hold
 
 # On a busy machine, a delayed page or robot stops.
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.serial]

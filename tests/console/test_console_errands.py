@@ -4,8 +4,8 @@ import pytest
 from console_ready import expect_state, select, wait_until_ready
 from playwright.sync_api import expect
 
-from real_browser import watched_tab
-from webmap_process import webmap
+from equipment.chromium import watched_tab
+from equipment.webmap_process import webmap
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

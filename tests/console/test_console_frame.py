@@ -7,7 +7,7 @@ import pytest
 from console_ready import select, title
 from playwright.sync_api import Page, expect
 
-from real_browser import hold
+from equipment.chromium import hold
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

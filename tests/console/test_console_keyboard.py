@@ -6,7 +6,7 @@ import pytest
 from console_ready import expect_state, shown_state, title
 from playwright.sync_api import Page, expect
 
-from real_browser import hold
+from equipment.chromium import hold
 
 # On a busy machine, a delayed page or robot stops.
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.serial]

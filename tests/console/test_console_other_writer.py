@@ -7,9 +7,9 @@ import pytest
 from playwright.sync_api import expect
 from websockets.sync.client import connect
 
-from real_browser import hold, watched_tab
+from equipment.chromium import hold, watched_tab
+from equipment.webmap_process import webmap
 from webmap.testing import WitnessRobot
-from webmap_process import webmap
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.serial]
 

@@ -4,7 +4,7 @@ import pytest
 from console_ready import assert_free
 from playwright.sync_api import expect
 
-from real_browser import end_stops
+from equipment.chromium import end_stops
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

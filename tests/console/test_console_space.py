@@ -11,7 +11,7 @@ import pytest
 from console_ready import expect_state, select, send_away, shown_state, unfold
 from playwright.sync_api import Page, expect
 
-from real_browser import end_stops
+from equipment.chromium import end_stops
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.serial]
 

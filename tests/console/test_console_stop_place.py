@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Page, expect
 
-from real_browser import hold
+from equipment.chromium import hold
 
 pytestmark = pytest.mark.browser
 

@@ -8,8 +8,8 @@ import pytest
 from console_ready import assert_free, select, title, wait_until_ready
 from playwright.sync_api import Page, expect
 
-from real_browser import end_stops, hold, watched_tab
-from webmap_process import page_of, simulator
+from equipment.chromium import end_stops, hold, watched_tab
+from equipment.webmap_process import page_of, simulator
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

@@ -15,8 +15,8 @@ from console_ready import (
 )
 from playwright.sync_api import expect
 
-from real_browser import end_stops, hold, watched_tab
-from webmap_process import simulator, webmap
+from equipment.chromium import end_stops, hold, watched_tab
+from equipment.webmap_process import simulator, webmap
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from webmap_process import simulator
+from equipment.webmap_process import simulator
 
 PROGRAM = Path(__file__).with_name("program_that_drives.py")
 SCRIPT = Path(__file__).parents[2] / "examples" / "script" / "script.py"

@@ -1,12 +1,11 @@
 """10,000 topics need few service calls and an amount of work linear in their number."""
 
 import asyncio
-import sys
 import threading
-from pathlib import Path
 
 import pytest
 
+from equipment.fake_rosbridge import bridged
 from webmap.config.fleet import dump
 from webmap.console import Console
 from webmap.discovery import discover
@@ -18,10 +17,6 @@ from webmap.fleet.periodic_search import LayerSearch, RobotSearch
 from webmap.fleet.search import search_bridges
 from webmap.fleet.view_robots import ViewRobots
 from webmap.modules import declaration
-
-# The fake rosbridge is in the folder of the bridge's tests.
-sys.path.append(str(Path(__file__).parents[1] / "ros"))
-from fake_rosbridge import bridged
 
 pytestmark = pytest.mark.slow
 

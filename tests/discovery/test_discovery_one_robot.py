@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from frames_only import TF, publishing
 
-from cli_inside import run_inside
+from equipment.command_line import run_inside
 from webmap.base.geometry import Pose
 from webmap.discovery import discover
 from webmap.discovery.frames import odometry_topics, receive_frames

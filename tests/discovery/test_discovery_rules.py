@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from captured_frames import CAPTURED
+from equipment.captured_frames import CAPTURED
 from webmap.discovery import discover
 from webmap.discovery.findings import ROLES
 from webmap.discovery.robots import host_name

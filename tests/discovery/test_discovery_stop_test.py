@@ -10,12 +10,12 @@ import time
 
 import pytest
 
+from equipment.webmap_process import simulator
 from webmap.discovery.doctor.stop_test import GOES_ON, STOPS, UNKNOWN, StopTestClient
 from webmap.gate.disk import Records
 from webmap.gate.events import Key, Press, StopRecord
 from webmap.gate.rules.stop_test import MOVES_ON
 from webmap.testing import WitnessRobot
-from webmap_process import simulator
 
 # On a busy machine the simulator's clock lags and a driver sends nothing.
 pytestmark = pytest.mark.serial

@@ -12,7 +12,7 @@ import cbor2
 import numpy as np
 from PIL import Image
 
-from ray_points import points_of
+from equipment.ray_points import points_of
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Affine
 from webmap.base.scope import Removal, current_scope, keep, no_scope

@@ -7,7 +7,7 @@ import time
 import pytest
 from playwright.sync_api import expect
 
-from cli_shown import shown
+from equipment.console_page import shown
 
 FLEET = """\
 [bridges]

@@ -10,7 +10,7 @@ import psutil
 import pytest
 from websockets.sync.client import connect
 
-from webmap_process import simulator
+from equipment.webmap_process import simulator
 
 pytestmark = pytest.mark.slow
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from cli_inside import run_inside
+from equipment.command_line import run_inside
 from webmap import Bridge
 from webmap.base.errors import ConfigError
 from webmap.discovery import discover

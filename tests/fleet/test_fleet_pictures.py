@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 from playwright.sync_api import expect
 
-from cli_shown import shown
+from equipment.console_page import shown
 from webmap.base.errors import ConfigError
 from webmap.core.pictures import pictures
 from webmap.fleet.fleet_file import prepare

@@ -6,8 +6,7 @@ searching for the report each time.
 
 from dataclasses import dataclass, field
 
-from gate_harness import Bench
-
+from equipment.gate_harness import Bench
 from webmap.gate import events, protocol
 from webmap.gate.process import IDLE_STEP, STEP
 

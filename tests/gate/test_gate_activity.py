@@ -1,8 +1,8 @@
 """The activity of a robot that the gate reports, in terms of an operator."""
 
 import pytest
-from gate_harness import KEY, Bench, spec
 
+from equipment.gate_harness import KEY, Bench, spec
 from webmap.base.geometry import Twist
 from webmap.gate import events
 from webmap.gate.rules.goals import BRAKES

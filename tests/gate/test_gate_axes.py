@@ -3,10 +3,10 @@
 import math
 
 import pytest
-from gate_harness import KEY, ZERO, Bench, spec
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from equipment.gate_harness import KEY, ZERO, Bench, spec
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
 from webmap.gate import commands, events, protocol

@@ -4,8 +4,8 @@ import json
 
 import msgspec
 import pytest
-from gate_harness import KEY, URL, ZERO, Bench, spec
 
+from equipment.gate_harness import KEY, URL, ZERO, Bench, spec
 from webmap.base.geometry import Twist
 from webmap.gate import actions, commands, events, protocol
 from webmap.gate.events import Key

@@ -6,9 +6,9 @@ import threading
 
 import msgspec
 import pytest
-from gate_harness import Bench, spec
 from gate_robot import eventually
 
+from equipment.gate_harness import Bench, spec
 from webmap.base.errors import ConfigError, MotionError, NoLease
 from webmap.base.geometry import Twist
 from webmap.gate import commands, protocol

@@ -6,10 +6,10 @@ import threading
 
 import msgspec
 import pytest
-from gate_harness import Bench, spec
 from hypothesis import given
 from hypothesis import strategies as st
 
+from equipment.gate_harness import Bench, spec
 from webmap.gate import protocol
 from webmap.gate.display.pages import Pages
 from webmap.gate.limits import Cap, Speed, offered, page_cap, speed_in_force

@@ -1,8 +1,8 @@
 """Control changes to another operator: on request, and only at standstill."""
 
 import pytest
-from gate_harness import KEY, ZERO, Bench, spec
 
+from equipment.gate_harness import KEY, ZERO, Bench, spec
 from webmap.base.geometry import Twist
 from webmap.gate import actions, commands, events, protocol
 

@@ -3,9 +3,9 @@
 import json
 
 import pytest
-from gate_harness import KEY, URL, Bench, spec
 from link_bench import frame, in_loop, noting_bridge, raw_bridge, until
 
+from equipment.gate_harness import KEY, URL, Bench, spec
 from webmap.gate import actions, events, protocol
 from webmap.gate.display import pages
 from webmap.gate.lanes import navigation, tasks

@@ -3,8 +3,8 @@
 import asyncio
 
 import pytest
-from gate_harness import URL, Bench, spec
 
+from equipment.gate_harness import URL, Bench, spec
 from webmap.base.geometry import Twist
 from webmap.gate import actions, events, protocol
 from webmap.gate.disk import Disk, Records, path_of

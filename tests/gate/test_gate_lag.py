@@ -5,9 +5,9 @@ import time
 
 import cbor2
 import pytest
-from gate_harness import KEY, Bench, spec
 from link_bench import in_loop, noting_bridge, until
 
+from equipment.gate_harness import KEY, Bench, spec
 from webmap.base.geometry import Twist
 from webmap.gate.clock import now
 from webmap.gate.events import LinkUp, OdometryReceived, ScanReceived

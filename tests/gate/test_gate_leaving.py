@@ -3,10 +3,10 @@
 import asyncio
 
 import pytest
-from gate_harness import spec
 from link_bench import in_loop
 
-from hanging_bridge import hanging_bridge, until
+from equipment.gate_harness import spec
+from equipment.hanging_bridge import hanging_bridge, until
 from webmap.gate.actions import SendGoal
 from webmap.gate.events import EchoReceived, Key, LinkUp
 from webmap.gate.lanes.control import ControlLane

@@ -1,8 +1,8 @@
 """The lanes that robots need to their bridges, and the actions over the lanes."""
 
-from gate_harness import spec
 from link_bench import in_loop, noting_bridge, until
 
+from equipment.gate_harness import spec
 from webmap.base.geometry import Twist
 from webmap.gate import actions
 from webmap.gate.clock import now

@@ -23,7 +23,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from gate_harness import KEY, URL, spec
 from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
@@ -36,6 +35,7 @@ from hypothesis.stateful import (
 )
 from machine_bench import PacedBench
 
+from equipment.gate_harness import KEY, URL, spec
 from webmap.base.geometry import Twist
 from webmap.gate import actions, commands, events, protocol
 from webmap.gate.events import Press

@@ -3,8 +3,8 @@
 import json
 
 import pytest
-from gate_harness import Bench, spec
 
+from equipment.gate_harness import Bench, spec
 from webmap.gate import protocol
 from webmap.gate.commands import Stop, begins_like_stop, robot_in, stop_in
 

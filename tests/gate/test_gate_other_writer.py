@@ -5,10 +5,10 @@ from itertools import count
 
 import numpy as np
 import pytest
-from gate_harness import KEY, Bench, spec
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from equipment.gate_harness import KEY, Bench, spec
 from webmap.base.geometry import Twist
 from webmap.gate import events, protocol
 from webmap.gate.events import Key, LockState

@@ -4,10 +4,10 @@ import itertools
 import math
 
 import pytest
-from gate_harness import spec
 from hypothesis import given
 from hypothesis import strategies as st
 
+from equipment.gate_harness import spec
 from webmap.base.geometry import Twist
 from webmap.gate.commands import Refusal
 from webmap.gate.limits import Cap, Speed, caps_of, fit, ramp, speed_in_force

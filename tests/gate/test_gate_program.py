@@ -3,8 +3,8 @@
 import math
 
 import pytest
-from gate_harness import ZERO, Bench, spec
 
+from equipment.gate_harness import ZERO, Bench, spec
 from webmap.base.geometry import Twist
 from webmap.gate import actions, commands, protocol
 from webmap.gate.protocol import PROGRAM

@@ -1,7 +1,8 @@
 """The reports to pages while the display process pauses, and afterwards."""
 
 import pytest
-from gate_harness import Bench
+
+from equipment.gate_harness import Bench
 
 
 @pytest.mark.parametrize("taken", [False, True])

@@ -4,8 +4,8 @@ import json
 import math
 
 import pytest
-from gate_harness import KEY, spec
 
+from equipment.gate_harness import KEY, spec
 from webmap.base.geometry import Twist
 from webmap.gate.actions import SendGoal, SendPose
 from webmap.gate.lanes import rosbridge

@@ -5,8 +5,8 @@ import math
 
 import msgspec
 import pytest
-from gate_harness import KEY, ZERO, Bench, spec
 
+from equipment.gate_harness import KEY, ZERO, Bench, spec
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
 from webmap.gate import events

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from captured_frames import frame_file
+from equipment.captured_frames import frame_file
 from webmap.base.errors import ProtocolError
 from webmap.gate.lanes.odometry import parse_scan, subscribe
 

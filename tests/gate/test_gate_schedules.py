@@ -7,9 +7,9 @@ schedules have sequences of events that the other tests do not have.
 import random
 
 import pytest
-from gate_harness import KEY, spec
 from machine_bench import PacedBench
 
+from equipment.gate_harness import KEY, spec
 from webmap.base.geometry import Twist
 from webmap.gate import commands, events, protocol
 from webmap.gate.events import Press

@@ -5,16 +5,10 @@ import contextlib
 import json
 
 import pytest
-from gate_harness import spec
 from link_bench import in_loop, noting_bridge, until
 
-from webmap.gate import (
-    actions,
-    commands,
-    events,
-    process,
-    protocol,
-)
+from equipment.gate_harness import spec
+from webmap.gate import actions, commands, events, process, protocol
 from webmap.gate.disk import UNKNOWN, Disk, Records, path_of
 from webmap.gate.events import Key, Press
 from webmap.gate.lanes.control import ControlLane

@@ -3,10 +3,10 @@
 import math
 
 import pytest
-from gate_harness import spec
 from hypothesis import given
 from hypothesis import strategies as st
 
+from equipment.gate_harness import spec
 from webmap.base.errors import ConfigError
 from webmap.gate.rules.assist import polygon_around
 from webmap.gate.specs import MOST_CORNERS, checked, why_no_outline

@@ -3,8 +3,8 @@
 import json
 
 import pytest
-from gate_harness import KEY, URL, ZERO, Bench, spec
 
+from equipment.gate_harness import KEY, URL, ZERO, Bench, spec
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
 from webmap.gate import actions, commands, events, protocol

@@ -1,8 +1,8 @@
 """The stop test: creep, send nothing more, and measure when the base stops."""
 
 import pytest
-from gate_harness import KEY, ZERO, Bench, spec
 
+from equipment.gate_harness import KEY, ZERO, Bench, spec
 from webmap.base.geometry import Twist
 from webmap.gate import actions, events, protocol
 from webmap.gate.events import StopRecord

@@ -2,9 +2,9 @@
 
 import json
 
-from gate_harness import spec
 from link_bench import in_loop, noting_bridge, until
 
+from equipment.gate_harness import spec
 from webmap.gate.actions import SendGoal, SendPose
 from webmap.gate.events import GoalEnded, GoalLost, GoalProgress, Key, LinkDown, LinkUp
 from webmap.gate.lanes import tasks

@@ -1,8 +1,8 @@
 """The reports of motion after a zero, and of the age of the control loop."""
 
 import pytest
-from gate_harness import KEY, ZERO, Bench, spec
 
+from equipment.gate_harness import KEY, ZERO, Bench, spec
 from webmap.base.geometry import Twist
 from webmap.gate import actions, events
 from webmap.gate.limits import Speed

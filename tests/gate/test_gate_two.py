@@ -5,10 +5,10 @@ import os
 import time
 
 import pytest
-from gate_harness import KEY, URL, ZERO, Bench, spec
 from gate_page import Page
 from gate_robot import eventually
 
+from equipment.gate_harness import KEY, URL, ZERO, Bench, spec
 from webmap.gate import actions
 from webmap.gate.disk import Disk, Records
 from webmap.gate.display.client import GateClient

@@ -1,8 +1,8 @@
 """An unused lease expires, so that other operators can take control."""
 
 import pytest
-from gate_harness import Bench, spec
 
+from equipment.gate_harness import Bench, spec
 from webmap.gate import commands, protocol
 from webmap.gate.rules import authority
 

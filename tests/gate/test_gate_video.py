@@ -1,8 +1,8 @@
 """An operator who drives by a camera cannot drive with an old picture (S16)."""
 
 import pytest
-from gate_harness import Bench
 
+from equipment.gate_harness import Bench
 from webmap.gate.commands import Refusal, parse
 from webmap.gate.rules.health import Video
 

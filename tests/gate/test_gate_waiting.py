@@ -1,7 +1,8 @@
 """A command that waits to be written while the gate process pauses."""
 
 import pytest
-from gate_harness import Bench
+
+from equipment.gate_harness import Bench
 
 
 @pytest.mark.parametrize(("seconds", "written"), [(0.03, True), (0.1, False)])

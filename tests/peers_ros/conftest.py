@@ -1,17 +1,12 @@
 """A real ROS 2 graph for the tests, on machines where ROS can be installed."""
 
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 import real_ros
 from playwright.sync_api import Browser, Page
 
-from real_browser import watched_tab
-
-# The helpers that run commands and read the page are shared with other tests.
-sys.path.append(str(Path(__file__).parents[1] / "browser"))
+from equipment.chromium import watched_tab
 
 
 @pytest.fixture(scope="module")

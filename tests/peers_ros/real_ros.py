@@ -15,7 +15,7 @@ from typing import NamedTuple
 from ros_facts import ROBOT
 from websockets.sync.client import connect
 
-from surroundings import outside
+from equipment.environment import outside
 from webmap.testing import FaultProxy
 
 HERE = Path(__file__).parent

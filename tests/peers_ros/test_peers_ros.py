@@ -14,7 +14,6 @@ import time
 
 import pytest
 from playwright.sync_api import expect
-from processes import WEB, matrix, running, wait_until
 from ros_facts import (
     ANGLE_MIN,
     ANGLE_STEP,
@@ -27,7 +26,8 @@ from ros_facts import (
     TOPICS,
 )
 
-from real_browser import hold
+from equipment.chromium import hold
+from equipment.processes import WEB, matrix, running, wait_until
 
 # The first run installs ROS, which may take minutes.
 pytestmark = [

@@ -1,19 +1,14 @@
 """A robot at 1 kHz, behind a bridge that ignores the requested rate."""
 
 import asyncio
-import sys
 import time
-from pathlib import Path
 
+from equipment.fake_rosbridge import bridged, until
 from webmap import Robot
 from webmap.poses.frames import PERIOD
 from webmap.ros.tf import Transform
 from webmap.ros.tf.buffer import HISTORY
 from webmap.ros.tf.track import MOST, Track
-
-# The fake rosbridge is in the folder of the bridge's tests.
-sys.path.append(str(Path(__file__).parents[1] / "ros"))
-from fake_rosbridge import bridged, until
 
 COUNT = 2000
 LEVEL = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}

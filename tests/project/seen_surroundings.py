@@ -12,7 +12,7 @@ from pathlib import Path
 
 sys.path.append(str(Path(__file__).parents[1]))
 
-from surroundings import use_own_surroundings
+from equipment.environment import use_own_environment
 
 OF_PAGE = """() => {
   const width = (family) => {
@@ -34,7 +34,7 @@ CHILD = "import locale, time; print(locale.getencoding(), time.tzname)"
 
 def seen() -> dict[str, object]:
     """Return what differs between machines, after the surroundings are replaced."""
-    from real_browser import launched
+    from equipment.chromium import launched
 
     home = Path.home()
     with (home / "written").open("w") as written:  # the home folder can be written to
@@ -55,5 +55,5 @@ def seen() -> dict[str, object]:
 
 
 if __name__ == "__main__":
-    use_own_surroundings()
+    use_own_environment()
     print(json.dumps(seen()))

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from surroundings import outside
-from unusual import unusual
+from equipment.environment import outside, unusual_environment
 
 HERE = Path(__file__).parent
 
@@ -29,7 +28,7 @@ def test_nothing_of_the_machine_reaches_the_tests(tmp_path):
     usual = seen({"PATH": os.environ["PATH"]}, 0o022)
     assert usual["page"]["language"] == "en-US"
     assert usual["page"]["zone"] == "UTC"
-    assert seen(unusual(tmp_path), 0o077) == usual
+    assert seen(unusual_environment(tmp_path), 0o077) == usual
 
 
 def test_pip_gets_the_environment_of_the_machine(monkeypatch):

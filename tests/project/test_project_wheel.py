@@ -13,7 +13,7 @@ import httpx
 import pytest
 
 import webmap
-from surroundings import outside
+from equipment.environment import outside
 
 ROOT = Path(__file__).parents[2]
 SOURCE = ROOT / "src"

@@ -7,9 +7,9 @@ import time
 
 import msgspec
 import pytest
-from fake_rosbridge import FakeRosbridge, bridged, until
 
-from captured_frames import CAPTURED
+from equipment.captured_frames import CAPTURED
+from equipment.fake_rosbridge import FakeRosbridge, bridged, until
 from webmap.base.errors import (
     BridgeClosed,
     BridgeError,

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from camera_server import BOUNDARY, a_jpeg, part
+from equipment.camera_server import BOUNDARY, a_jpeg, part
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.ros.image_address import parse_address
 from webmap.ros.image_pull import HttpResponseParser, Multipart

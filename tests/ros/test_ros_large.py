@@ -5,8 +5,8 @@ import contextlib
 import json
 
 import pytest
-from fake_rosbridge import bridged, until
 
+from equipment.fake_rosbridge import bridged, until
 from webmap.base.scope import Scope
 from webmap.ros.bridge import Bridge
 from webmap.ros.rosbridge import wire_subscription

@@ -3,9 +3,9 @@
 import asyncio
 
 import pytest
-from fake_rosbridge import bridged
 
-from hanging_bridge import hanging_bridge, until
+from equipment.fake_rosbridge import bridged
+from equipment.hanging_bridge import hanging_bridge, until
 from webmap.ros.bridge import Bridge
 
 TYPES = {

@@ -7,9 +7,9 @@ from collections import deque
 import cbor2
 import msgspec
 import pytest
-from fake_rosbridge import bridged, until
 
-from captured_frames import CAPTURED
+from equipment.captured_frames import CAPTURED
+from equipment.fake_rosbridge import bridged, until
 from webmap.base.errors import ProtocolError
 from webmap.ros import offload, worker
 from webmap.ros.bridge import Bridge

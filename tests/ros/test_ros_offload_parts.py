@@ -7,9 +7,9 @@ import time
 
 import cbor2
 import pytest
-from fake_rosbridge import until
 from test_ros_limits import publish, transforms
 
+from equipment.fake_rosbridge import until
 from webmap.features.layers.diagnostics import DiagnosticArrayMsg
 from webmap.features.layers.markers.messages import MarkerArrayMsg
 from webmap.ros import offload, worker

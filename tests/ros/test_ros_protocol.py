@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from captured_frames import CAPTURED
+from equipment.captured_frames import CAPTURED
 from webmap.base.errors import ProtocolError
 from webmap.ros import messages
 from webmap.ros.rosbridge.events import (

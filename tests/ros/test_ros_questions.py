@@ -3,8 +3,8 @@
 import asyncio
 
 import pytest
-from fake_rosbridge import FakeRosbridge, bridged, until
 
+from equipment.fake_rosbridge import FakeRosbridge, bridged, until
 from webmap.base.errors import BridgeClosed, ConfigError, ServiceError
 from webmap.base.lifecycle import lifecycle
 from webmap.ros.bridge import Bridge, TemporaryBridge

@@ -4,8 +4,8 @@ import asyncio
 from itertools import pairwise
 
 import pytest
-from fake_rosbridge import bridged, until
 
+from equipment.fake_rosbridge import bridged, until
 from webmap.ros.rosbridge import wire_subscription
 from webmap.ros.rosbridge.wire_subscription import (
     AGAIN,

@@ -3,8 +3,8 @@
 import asyncio
 
 import pytest
-from fake_rosbridge import FakeRosbridge, bridged, until
 
+from equipment.fake_rosbridge import FakeRosbridge, bridged, until
 from webmap.base.errors import BridgeClosed
 from webmap.base.lifecycle import Lifecycle
 from webmap.base.scope import Scope

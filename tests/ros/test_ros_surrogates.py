@@ -5,8 +5,8 @@ import json
 from typing import Any
 
 import pytest
-from fake_rosbridge import bridged, until
 
+from equipment.fake_rosbridge import bridged, until
 from webmap.base.errors import ProtocolError, ServiceError
 from webmap.discovery import discover
 from webmap.ros.decoding import decode_json

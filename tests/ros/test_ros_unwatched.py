@@ -3,8 +3,8 @@
 import asyncio
 
 import pytest
-from fake_rosbridge import bridged, until
 
+from equipment.fake_rosbridge import bridged, until
 from webmap.base.audience import audience
 from webmap.base.errors import ConfigError
 from webmap.ros.bridge import Bridge

@@ -4,7 +4,7 @@ from array import array
 
 import pytest
 
-from captured_frames import CAPTURED
+from equipment.captured_frames import CAPTURED
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.ros import messages
 from webmap.ros.arrays import Floats, Int8s

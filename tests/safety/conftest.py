@@ -1,12 +1,6 @@
 """Provide the bench of all tests that need a real browser."""
 
-import sys
-from pathlib import Path
-
 import pytest
-
-# The modules that control Chromium and start processes are in tests/browser.
-sys.path.insert(0, str(Path(__file__).parents[1] / "browser"))
 
 
 @pytest.fixture(scope="module")

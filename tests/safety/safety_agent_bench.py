@@ -18,9 +18,9 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
-from processes import Process
 from safety_bench import pass_time, wait_for
 
+from equipment.processes import Process
 from webmap.core.motion import id_at_agent
 from webmap.testing import FaultProxy, Sentinel, WitnessRobot
 

@@ -14,9 +14,9 @@ from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import psutil
-from devtools import Chromium, Tab
-from processes import WEB, Process
 
+from equipment.devtools import Chromium, Tab
+from equipment.processes import WEB, Process
 from webmap.testing import FaultProxy, Sentinel, Shape, WitnessRobot
 
 SITE = Path(__file__).with_name("safety_site.py")

@@ -17,11 +17,12 @@ import sys
 from pathlib import Path
 
 import psutil
-from processes import WEB, Process
 from safety_bench import pass_time
 from safety_hostile import READY, RECORD_TICKS, SETTLE
 from safety_proof import ProvingBench
 from safety_waiting import Waiting
+
+from equipment.processes import WEB, Process
 
 HERE = Path(__file__).parent
 TLS = HERE.parent / "agents" / "tls"

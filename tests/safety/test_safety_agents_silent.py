@@ -5,11 +5,11 @@ import signal
 import psutil
 import pytest
 from playwright.sync_api import expect
-from processes import Process
 
-from real_browser import hold, watched_tab
+from equipment.chromium import hold, watched_tab
+from equipment.processes import Process
+from equipment.webmap_process import webmap
 from webmap.testing import WitnessRobot
-from webmap_process import webmap
 
 pytest.importorskip("zenoh")
 pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]

@@ -3,18 +3,14 @@
 import functools
 import json
 import pickle
-import sys
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from safety_corpus import CORPUS, NO_NUMBERS, REST, ROBOT
 
+from equipment.gate_harness import Bench, spec
 from webmap.gate import actions, protocol
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "gate"))
-from gate_harness import Bench, spec
 
 pytestmark = pytest.mark.slow
 

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
-from processes import WEB, reset, running
 from safety_bench import wait_for
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
-from real_browser import watched_tab
+from equipment.chromium import watched_tab
+from equipment.processes import WEB, reset, running
 from webmap.gate.display.client import GateClient
 from webmap.gate.protocol import RobotSpec
 from webmap.testing import Sentinel, WitnessRobot
@@ -42,10 +42,11 @@ class Simulator:
     """A simulator process of ROS 2 with one robot, and the odometry of the robot."""
 
     def __enter__(self):
-        options = ["--robots", "1", "--dialect", "ros2", "--until-eof"]
+        options = ["--port", "0", "--robots", "1", "--dialect", "ros2"]
+        command = [sys.executable, "-m", "webmap", "sim", "--with-parent"]
         quirks = ["--quirks", "real,blocking_goals,blocking_services,hanging_stop"]
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "webmap.sim", *options, *quirks],
+            [*command, *options, *quirks],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from webmap.sim.proxy import Shape, Shaper
+from webmap.testing.fault_proxy import Shape, Shaper
 
 shapes = st.builds(
     Shape,

@@ -5,7 +5,15 @@ from types import SimpleNamespace
 
 import pytest
 from page_loop import Loop
-from server_fakes import TOKEN, FakeGate, FakeModel, FakePage, FakeSite, key_in
+
+from equipment.server_fakes import (
+    TOKEN,
+    FakeGate,
+    FakeModel,
+    FakePage,
+    FakeSite,
+    key_in,
+)
 
 with warnings.catch_warnings():
     # Starlette wants another library for its test client; httpx works, too.

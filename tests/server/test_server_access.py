@@ -1,6 +1,6 @@
 import pytest
-from server_fakes import TOKEN
 
+from equipment.server_fakes import TOKEN
 from webmap.base.errors import ConfigError
 from webmap.core.base_page import Viewer
 from webmap.server.access import (

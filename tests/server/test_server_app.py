@@ -4,11 +4,11 @@ import re
 import zlib
 
 import pytest
-from server_fakes import TOKEN, FakePage, key_in
 from starlette.applications import Starlette
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.websockets import WebSocketDisconnect
 
+from equipment.server_fakes import TOKEN, FakePage, key_in
 from webmap.core.base_page import Viewer
 from webmap.core.pictures import pictures
 from webmap.server.access import Settings

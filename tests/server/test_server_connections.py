@@ -8,7 +8,9 @@ from pathlib import Path
 
 import httpx
 import pytest
-from server_fakes import (
+from websockets.asyncio.client import connect
+
+from equipment.server_fakes import (
     TOKEN,
     FakeGate,
     FakeModel,
@@ -17,8 +19,6 @@ from server_fakes import (
     running,
     wait_for,
 )
-from websockets.asyncio.client import connect
-
 from webmap.server import connections
 from webmap.server.access import Settings
 from webmap.server.app import WebApp

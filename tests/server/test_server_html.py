@@ -1,7 +1,7 @@
 import pytest
 
+from webmap.server.bundles import STARTS
 from webmap.server.html import NEXT, base_of, make_page, prepare_page
-from webmap.server.modules import STARTS
 
 PRELOADS = "".join(
     f'<link rel="{"modulepreload" if name in STARTS[:2] else NEXT}" '

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from webmap.server.modules import (
+from webmap.server.bundles import (
+    FIRST_PARTS,
     PART_FOLDERS,
     PART_SHEETS,
     PARTS,
@@ -21,8 +22,8 @@ from webmap.server.own_files import FOLDERS, PACKAGE
 
 HERE = Path(__file__).parent
 
-OBJECT = re.compile(r"\$\w+")
-"""The names of the objects with which modules refer to each other."""
+OBJECT = "$modules"
+"""The name of the object with which modules refer to each other."""
 
 
 def own_files(suffix: str) -> dict[str, str]:
@@ -68,7 +69,7 @@ def test_only_comments_are_left_out_and_lines_keep_their_numbers(read):
 def test_each_module_has_the_same_exports_as_its_source(read):
     exported = read["exported"]
     for name in own_files(".js"):
-        names = [one for one in exported[name] if not OBJECT.fullmatch(one)]
+        names = [one for one in exported[name] if one != OBJECT]
         assert sorted(names) == sorted(exported[f"written {name}"]), name
 
 
@@ -77,8 +78,7 @@ def test_each_module_of_webmap_is_served_once_and_a_page_starts_with_few():
     served = served_modules(sources)
     texts = {name: text for name, text in served.items() if name.endswith(".js")}
     for name in sources:
-        made = "$" + re.sub(r"\W", "_", name.removesuffix(".js"))
-        where = [key for key, text in texts.items() if f"const {made} = (" in text]
+        where = [key for key, text in texts.items() if f'["{name}"] ??= (' in text]
         assert len(where) == 1, name
     loaded, todo = set(), list(STARTS)
     while todo:
@@ -88,6 +88,7 @@ def test_each_module_of_webmap_is_served_once_and_a_page_starts_with_few():
             needed = (PACKAGE / name).parent.joinpath(address).resolve()
             todo.append(needed.relative_to(PACKAGE).as_posix())
     assert loaded == set(STARTS)
+    assert len(STARTS) == 3
 
 
 def test_a_source_map_has_the_source_of_each_line():
@@ -129,23 +130,24 @@ FEW = {
 def test_modules_that_a_page_does_not_start_with_are_served_as_one():
     served = served_modules(FEW, ["start.js"])
     assert served[PARTS] == (
-        'import { $both } from "./start.js";\n'
-        "const $x_own = (() => {\n"
-        "const {\n  a,\n  b: c,\n} = $both;\n"
+        'import { $modules } from "./start.js";\n'
+        '$modules["x/own.js"] ??= (() => {\n'
+        'const {\n  a,\n  b: c,\n} = $modules["both.js"];\n'
         "\nclass own {}\n"
         "\nreturn { own };\n})();\n"
-        "const $tool = (() => {\n"
+        '$modules["tool.js"] ??= (() => {\n'
         "async function tool() {}\n"
         "\nreturn { tool };\n})();\n"
-        "const $x_one = (() => {\n"
-        "const { b } = $both;\nconst { own } = $x_own;\nconst { tool } = $tool;\n"
+        '$modules["x/one.js"] ??= (() => {\n'
+        'const { b } = $modules["both.js"];\n'
+        'const { own } = $modules["x/own.js"];\n'
+        'const { tool } = $modules["tool.js"];\n'
         "function attach() {}\n"
         "\nreturn { default: attach };\n})();\n"
-        "const $x_two = (() => {\n"
-        "const { tool } = $tool;\nclass Two {}\n"
+        '$modules["x/two.js"] ??= (() => {\n'
+        'const { tool } = $modules["tool.js"];\nclass Two {}\n'
         "\nreturn { default: Two };\n})();\n"
-        "export { $x_own, $tool, $x_one, $x_two };\n"
-        'export const parts = {\n"x/one.js": $x_one,\n"x/two.js": $x_two,\n};\n'
+        "export { $modules };\n"
         "//# sourceMappingURL=parts.js.map\n"
     )
 
@@ -153,15 +155,40 @@ def test_modules_that_a_page_does_not_start_with_are_served_as_one():
 def test_the_address_of_a_module_within_another_has_the_same_exports():
     served = served_modules(FEW, ["start.js"])
     assert served["both.js"] == (
-        'import { $both } from "./start.js";\nexport const { a, b } = $both;\n'
+        'import { $modules } from "./start.js";\n'
+        'export const { a, b } = $modules["both.js"];\n'
     )
     assert served["x/own.js"] == (
-        'import { $x_own } from "../parts.js";\nexport const { own } = $x_own;\n'
+        'import { $modules } from "../parts.js";\n'
+        'export const { own } = $modules["x/own.js"];\n'
     )
     assert served["x/one.js"] == (
-        'import { $x_one } from "../parts.js";\nexport default $x_one.default;\n'
+        'import { $modules } from "../parts.js";\n'
+        'export default $modules["x/one.js"].default;\n'
     )
     assert set(served) - set(FEW) == {PARTS, PARTS + ".map", "start.js.map"}
+
+
+def test_a_module_is_one_instance_for_users_and_in_a_bundle_that_is_loaded_twice(
+    tmp_path,
+):
+    for name, text in served_modules(FEW, ["start.js"]).items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    (tmp_path / "package.json").write_text('{"type": "module"}')
+    (tmp_path / "user.js").write_text(
+        'import { own } from "./x/own.js";\n'
+        'const loads = ["./parts.js", "./parts.js?again=1"].map((at) => import(at));\n'
+        "for (const { $modules } of await Promise.all(loads)) {\n"
+        '  console.log($modules["x/own.js"].own === own);\n'
+        "}\n"
+    )
+    node = shutil.which("node")
+    assert node, "node is needed to test the browser's modules"
+    done = subprocess.run(
+        [node, tmp_path / "user.js"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["true", "true"]
 
 
 def declared():
@@ -176,15 +203,16 @@ def declared():
 
 
 def test_all_declared_browser_parts_are_served_with_their_styles():
-    parts = served_modules(own_files(".js"))[PARTS]
+    modules = served_modules(own_files(".js"))
     sheets = served_sheets(own_files(".css"))
     names = declared()
     assert len(names) > 30
     for name in names:
-        if name.endswith(".js") and name not in STARTS:
+        if name.endswith(".js"):
             assert name.startswith(PART_FOLDERS), name
-            assert f'"{name}": $' in parts, name
-        elif name.endswith(".css") and name.removesuffix(".css") + ".js" not in STARTS:
+            bundle = modules[FIRST_PARTS.get(name, PARTS)]
+            assert f'$modules["{name}"] ??= (' in bundle, name
+        elif name.removesuffix(".css") + ".js" not in FIRST_PARTS:
             own = re.sub("@import.*", "", sheets[name]).strip()
             assert own in sheets[PART_SHEETS], name
     assert sheets[PART_SHEETS].count("@import") == 1
@@ -223,9 +251,8 @@ def test_a_style_sheet_is_served_with_those_that_it_imports():
     assert served["x/d.css"].split() == ["b{}", "c{}", "a{}", "c{}", "d{}"]
     del sheets["x/d.css"]
     served = served_sheets(sheets, shared="base.css")
-    assert served["x/a.css"].split("\n") == [
-        '@import url("../base.css");', "c{}", "", "a{}", "",
-    ]  # fmt: skip
+    lines = ['@import url("../base.css");', "c{}", "a{}"]
+    assert served["x/a.css"].splitlines() == lines
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,10 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 
 import pytest
-from server_fakes import FakeGate, FakeModel, FakePage, FakeSite
 
+from equipment.server_fakes import FakeGate, FakeModel, FakePage, FakeSite
 from webmap.base.errors import ConfigError
-from webmap.server import application, opening
+from webmap.server import application, runner
 from webmap.server.app import WebApp
 
 URL = "http://127.0.0.1:8000/"
@@ -52,7 +52,7 @@ def file_of(arguments):
 
 
 def test_the_browser_opens_a_file_that_only_its_owner_can_read(browser, home):
-    with opening.opened(URL, "the-code"):
+    with runner.browser_at(URL, "the-code"):
         file = file_of(browser())
         assert file.parent == home
         assert stat.S_IMODE(file.stat().st_mode) == 0o600
@@ -62,23 +62,23 @@ def test_the_browser_opens_a_file_that_only_its_owner_can_read(browser, home):
 
 
 def test_the_file_is_removed_when_its_code_expires(browser, home, monkeypatch):
-    monkeypatch.setattr(opening, "CODE_LIFE_S", 0.0)
+    monkeypatch.setattr(runner, "CODE_LIFE_S", 0.0)
     gone = threading.Event()
     monkeypatch.setattr(Path, "unlink", lambda *_, **__: gone.set())
-    with opening.opened(URL, "the-code"):
+    with runner.browser_at(URL, "the-code"):
         assert gone.wait(10)
 
 
 def test_without_a_writable_home_the_file_is_in_the_temporary_folder(browser, home):
     home.rmdir()
     (home.parent / "tmp").mkdir()
-    with opening.opened(URL, "the-code"):
+    with runner.browser_at(URL, "the-code"):
         assert file_of(browser()).parent == home.parent / "tmp"
 
 
 def test_without_a_writable_folder_the_log_refers_to_the_printed_address(home, caplog):
     home.rmdir()
-    with opening.opened(URL, "the-code"):
+    with runner.browser_at(URL, "the-code"):
         assert "open the printed address yourself" in caplog.text
     assert "the-code" not in caplog.text
 

@@ -2,8 +2,8 @@ import gzip
 
 import pytest
 
-from webmap.server import packed
-from webmap.server.packed import Packed, accepts_gzip, may_pack
+from webmap.server import files
+from webmap.server.files import GzipCache, accepts_gzip, is_worth_compressing
 
 
 @pytest.mark.parametrize(
@@ -25,25 +25,25 @@ def test_gzip_is_for_browsers_that_read_it(header, expected):
 
 
 def test_texts_are_compressed_and_pictures_and_very_short_ones_are_not():
-    assert may_pack("text/css; charset=utf-8", 10_000)
-    assert may_pack("image/svg+xml; charset=utf-8", 10_000)
-    assert not may_pack("image/png", 10_000)
-    assert not may_pack("text/css", 20)
-    assert not may_pack("text/css", packed.MOST_BYTES + 1)
+    assert is_worth_compressing("text/css; charset=utf-8", 10_000)
+    assert is_worth_compressing("image/svg+xml; charset=utf-8", 10_000)
+    assert not is_worth_compressing("image/png", 10_000)
+    assert not is_worth_compressing("text/css", 20)
+    assert not is_worth_compressing("text/css", files.MOST_COMPRESSED_BYTES + 1)
 
 
 def test_equal_content_is_compressed_once():
-    store = Packed()
-    first = store.of(b"a" * 1000)
+    store = GzipCache()
+    first = store.compressed(b"a" * 1000)
     assert gzip.decompress(first) == b"a" * 1000
-    assert store.of(bytes(bytearray(b"a" * 1000))) is first
+    assert store.compressed(bytes(bytearray(b"a" * 1000))) is first
 
 
 def test_what_was_not_used_for_longest_is_dropped_when_the_store_is_full(monkeypatch):
-    monkeypatch.setattr(packed, "MOST_STORED_BYTES", 2500)
-    store = Packed()
-    one, two = store.of(b"1" * 1000), store.of(b"2" * 1000)
-    assert store.of(b"1" * 1000) is one
-    store.of(b"3" * 1000)
-    assert store.of(b"1" * 1000) is one
-    assert store.of(b"2" * 1000) is not two
+    monkeypatch.setattr(files, "MOST_STORED_BYTES", 2500)
+    store = GzipCache()
+    one, two = store.compressed(b"1" * 1000), store.compressed(b"2" * 1000)
+    assert store.compressed(b"1" * 1000) is one
+    store.compressed(b"3" * 1000)
+    assert store.compressed(b"1" * 1000) is one
+    assert store.compressed(b"2" * 1000) is not two

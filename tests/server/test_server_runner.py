@@ -12,9 +12,16 @@ from pathlib import Path
 
 import httpx
 import pytest
-from server_fakes import TOKEN, FakeGate, FakeModel, FakePage, FakeSite, sign_in
 from websockets.sync.client import connect
 
+from equipment.server_fakes import (
+    TOKEN,
+    FakeGate,
+    FakeModel,
+    FakePage,
+    FakeSite,
+    sign_in,
+)
 from webmap.base.errors import ConfigError, WebMapError
 from webmap.server.access import Settings
 from webmap.server.app import WebApp
@@ -23,7 +30,7 @@ from webmap.server.runner import announce, check_exposure, listen, serve, url_of
 PROGRAM = """
 import sys
 sys.path.insert(0, sys.argv[1])
-from server_fakes import FakeGate, FakeModel, FakePage, FakeSite
+from equipment.server_fakes import FakeGate, FakeModel, FakePage, FakeSite
 from webmap.server.app import WebApp
 from webmap.server.runner import serve
 from webmap.server.access import Settings
@@ -40,7 +47,7 @@ print("ended", flush=True)
 def process():
     """A process that serves; at its end, its output and log are shown."""
     child = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM, str(Path(__file__).parent), TOKEN],
+        [sys.executable, "-c", PROGRAM, str(Path(__file__).parents[1]), TOKEN],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

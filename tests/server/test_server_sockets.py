@@ -8,15 +8,15 @@ import socket as sockets
 from urllib.parse import urlencode
 
 import pytest
-from server_fakes import TOKEN, running, wait_for
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.frames import Frame, Opcode
 
+from equipment.server_fakes import TOKEN, running, wait_for
 from webmap.server.access import Settings
 from webmap.server.app import WebApp
-from webmap.server.drive_socket import MOST_STOP_ONLY
 from webmap.server.page_socket import OPENS_AT_ONCE, REPLACED, TOO_SOON
+from webmap.server.sockets import MOST_STOP_ONLY
 
 TICK = '{"op":"tick","tick":%d,"ack":-1}'
 
@@ -25,7 +25,7 @@ TICK = '{"op":"tick","tick":%d,"ack":-1}'
 def module_rooms():
     from types import SimpleNamespace
 
-    from server_fakes import FakeGate, FakeModel, FakePage, FakeSite
+    from equipment.server_fakes import FakeGate, FakeModel, FakePage, FakeSite
 
     return SimpleNamespace(
         site=FakeSite(FakePage("/"), FakePage("/lab")),

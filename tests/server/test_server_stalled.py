@@ -6,7 +6,10 @@ import logging
 import time
 
 import pytest
-from server_fakes import (
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed
+
+from equipment.server_fakes import (
     TOKEN,
     FakeGate,
     FakeModel,
@@ -15,9 +18,6 @@ from server_fakes import (
     running,
     wait_for,
 )
-from websockets.asyncio.client import connect
-from websockets.exceptions import ConnectionClosed
-
 from webmap.server import page_socket, runner
 from webmap.server.access import Settings
 from webmap.server.app import WebApp

@@ -6,9 +6,9 @@ import pytest
 from page_loop import make_model, open_page, wait_for
 
 import webmap
+from equipment.webmap_process import simulator
 from webmap.base import audience as audience_module
 from webmap.base.audience import audience
-from webmap_process import simulator
 
 
 @pytest.fixture

@@ -158,10 +158,13 @@ class Client:
         return responses[-1] if responses else None
 
 
+SIMULATOR = ("webmap", "sim", "--port", "0")
+
+
 @contextlib.contextmanager
-def running(*options, module="webmap.sim", cwd=None):
-    """Run a server as a separate process; yield its URL."""
-    command = [sys.executable, "-m", module, *options]
+def running(*options, module=None, cwd=None):
+    """Run the simulator, or a module, as a separate process; yield its URL."""
+    command = [sys.executable, "-m", *([module] if module else SIMULATOR), *options]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=cwd)
     try:
         line = process.stdout.readline()

@@ -16,9 +16,8 @@ from webmap.ros.rosbridge.server.dialect import Dialect
 from webmap.ros.rosbridge.server.encode import Encoder, Publication
 from webmap.ros.rosbridge.server.quirks import POLITE
 from webmap.ros.rosbridge.server.schema import Schema
-from webmap.sim.maps import FloorPlan
+from webmap.sim.maps import FloorPlan, Obstacles
 from webmap.sim.messages import Messages
-from webmap.sim.obstacles import Obstacles
 from webmap.sim.world import HEIGHT, WIDTH, SimCamera
 
 

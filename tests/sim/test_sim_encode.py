@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from captured_frames import CAPTURED, frame_file
+from equipment.captured_frames import CAPTURED, frame_file
 from webmap.ros.rosbridge.server.dialect import Dialect
 from webmap.ros.rosbridge.server.encode import Encoder, Publication, serialize
 from webmap.ros.rosbridge.server.quirks import POLITE, REAL, USUAL

@@ -6,8 +6,8 @@ import pytest
 from simulated import Bench
 
 from webmap.base.geometry import Pose
-from webmap.sim.errands import QUIET, REST
 from webmap.sim.maps import FLOOR, load_map
+from webmap.sim.navigator import QUIET, REST
 from webmap.sim.world import LOW_CHARGE, World, WorldOptions
 
 FREE, BUSY = 0, 1

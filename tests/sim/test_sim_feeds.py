@@ -8,12 +8,11 @@ import pytest
 from simulated import Bench, room
 
 from webmap.base.geometry import Pose, Twist
-from webmap.sim.feeds.cloud import POINT, cloud_points
 from webmap.sim.feeds.localization import SURE, Belief
 from webmap.sim.feeds.navigation import Costs, distances
-from webmap.sim.maps import UNKNOWN
+from webmap.sim.feeds.sensors import LIDAR_POINT, cloud_points
+from webmap.sim.maps import UNKNOWN, Obstacles
 from webmap.sim.navigator import SimGoal
-from webmap.sim.obstacles import Obstacles
 
 DIALECTS = pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 LOCAL = {
@@ -255,7 +254,7 @@ def test_a_point_cloud_contains_the_walls_and_the_floor(dialect, compression):
     assert cloud["row_step"] == len(data) == cloud["width"] * cloud["point_step"]
     named = {field["name"]: field for field in cloud["fields"]}
     assert [named[name]["offset"] for name in ("x", "y", "z")] == [0, 4, 8]
-    points = np.frombuffer(data, POINT)
+    points = np.frombuffer(data, LIDAR_POINT)
     assert set(points["ring"].tolist()) == {0, 1, 2, 3}
     assert points["z"].max() > 0.3
     at = bench.world.robots[0].pose

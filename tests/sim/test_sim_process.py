@@ -13,11 +13,11 @@ from dataclasses import fields
 from pathlib import Path
 
 import pytest
-from simulated import room, running
+from simulated import SIMULATOR, room, running
 from websockets.asyncio.client import connect
 
-from captured_frames import PLAYER, frame_file, played
-from frame_player import load_recording
+from equipment.captured_frames import PLAYER, frame_file, played
+from equipment.frame_player import load_recording
 from webmap.base.errors import ConfigError
 from webmap.ros.rosbridge.server.dialect import Dialect
 from webmap.ros.rosbridge.server.encode import Encoder
@@ -129,7 +129,7 @@ def test_the_reference_lists_every_quirk_with_its_versions():
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_the_process_cleanly(number):
     process = subprocess.Popen(
-        [sys.executable, "-m", "webmap.sim"],
+        [sys.executable, "-m", *SIMULATOR],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -142,9 +142,9 @@ def test_a_signal_ends_the_process_cleanly(number):
     assert "Traceback" not in err
 
 
-def test_with_until_eof_the_process_ends_with_its_standard_input():
+def test_with_its_parent_the_process_ends_with_its_standard_input():
     process = subprocess.Popen(
-        [sys.executable, "-m", "webmap.sim", "--until-eof"],
+        [sys.executable, "-m", *SIMULATOR, "--with-parent"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -152,19 +152,6 @@ def test_with_until_eof_the_process_ends_with_its_standard_input():
     process.stdout.readline()
     process.communicate(timeout=20)
     assert process.returncode == 0
-
-
-def test_an_invalid_option_ends_the_process_with_a_one_line_error():
-    for options in (["--map", "absent.yaml"], ["--robots", "0"]):
-        done = subprocess.run(
-            [sys.executable, "-m", "webmap.sim", *options],
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 2
-        assert done.stderr.startswith("error: ")
-        assert done.stderr.count("\n") == 1
 
 
 def test_a_stalled_client_delays_no_other_client_and_uses_little_memory():

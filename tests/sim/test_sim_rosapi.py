@@ -3,7 +3,7 @@ import json
 import pytest
 from simulated import Bench
 
-from captured_frames import frame_file
+from equipment.captured_frames import frame_file
 
 
 @pytest.fixture

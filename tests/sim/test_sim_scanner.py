@@ -5,7 +5,7 @@ import pytest
 from simulated import room
 
 from webmap.base.geometry import Pose
-from webmap.sim.obstacles import Obstacles, chebyshev_distance, dilate
+from webmap.sim.maps import Obstacles, chebyshev_distance, dilate
 from webmap.sim.scanner import Scanner, ScannerOptions, cast_rays
 
 

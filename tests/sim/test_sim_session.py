@@ -6,7 +6,7 @@ import math
 import pytest
 from simulated import Bench
 
-from captured_frames import frame_file
+from equipment.captured_frames import frame_file
 
 CMD = "/robot_0/cmd_vel"
 ODOM = "/robot_0/odom"

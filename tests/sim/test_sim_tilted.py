@@ -9,8 +9,7 @@ from test_sim_feeds import messages_of
 
 from webmap.base.geometry import Quaternion, Vector3
 from webmap.ros.tf import Transform
-from webmap.sim.feeds.cloud import POINT
-from webmap.sim.feeds.depth import POINT as DEPTH
+from webmap.sim.feeds.sensors import CAMERA_POINT, LIDAR_POINT
 
 DIALECTS = pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 
@@ -62,7 +61,7 @@ def test_the_scan_of_an_upside_down_scanner_lies_on_the_walls(dialect):
 def test_the_cloud_of_an_upside_down_lidar_has_the_floor_at_the_bottom():
     bench = Bench(robots=1, tilted=True)
     cloud = messages_of(bench, "/robot_0/points", compression="cbor")[-1]
-    points = np.frombuffer(cloud["data"], POINT)
+    points = np.frombuffer(cloud["data"], LIDAR_POINT)
     there = on_map(bench, "base_laser", zip(*(points[a] for a in "xyz"), strict=True))
     assert there[:, 2].min() == pytest.approx(0.0, abs=1e-3)
     assert to_wall(there[there[:, 2] > 0.01]).max() < 0.01
@@ -72,7 +71,7 @@ def test_the_cloud_of_a_depth_camera_is_in_its_optical_frame():
     bench = Bench(robots=1, tilted=True)
     cloud = messages_of(bench, "/robot_0/camera/points", compression="cbor")[-1]
     assert cloud["header"]["frame_id"] == "robot_0/camera_optical"
-    points = np.frombuffer(cloud["data"], DEPTH)
+    points = np.frombuffer(cloud["data"], CAMERA_POINT)
     assert points["z"].min() > 0.2, "the z axis points forward"
     there = on_map(
         bench, "camera_optical", zip(*(points[a] for a in "xyz"), strict=True)

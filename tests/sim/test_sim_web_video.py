@@ -21,9 +21,15 @@ from webmap.base.lifecycle import Lifecycle
 from webmap.core.pictures import pictures
 from webmap.features.cameras import http_camera
 from webmap.ros.image_pull import HttpResponseParser
-from webmap.sim import run_simulator
-from webmap.sim.web_video import WebVideoServer, server
-from webmap.sim.web_video.request import Form, NoPicture, Refusal, Request, read_request
+from webmap.sim import run_simulator, web_video
+from webmap.sim.web_video import (
+    HttpError,
+    NoPicture,
+    PictureFormat,
+    PictureRequest,
+    WebVideoServer,
+    read_request,
+)
 
 TOPIC = "/robot_0/camera/image_raw"
 STREAM = f"/stream?topic={TOPIC}&type=mjpeg"
@@ -36,22 +42,25 @@ def asked(target):
 @pytest.mark.parametrize(
     ("target", "request_"),
     [
-        ("/", Request("list")),
-        (STREAM, Request("stream", TOPIC)),
-        (f"/stream?topic={TOPIC}", Request("stream", TOPIC)),
+        ("/", PictureRequest("list")),
+        (STREAM, PictureRequest("stream", TOPIC)),
+        (f"/stream?topic={TOPIC}", PictureRequest("stream", TOPIC)),
         (
             f"/stream?topic={TOPIC}&width=-1&qos_profile=sensor",
-            Request("stream", TOPIC),
+            PictureRequest("stream", TOPIC),
         ),
-        (f"/stream?topic={TOPIC[1:]}&topic=/b", Request("stream", TOPIC)),
-        (f"/snapshot?topic={TOPIC.replace('/', '%2F')}", Request("snapshot", TOPIC)),
+        (f"/stream?topic={TOPIC[1:]}&topic=/b", PictureRequest("stream", TOPIC)),
+        (
+            f"/snapshot?topic={TOPIC.replace('/', '%2F')}",
+            PictureRequest("snapshot", TOPIC),
+        ),
         (
             f"/snapshot?topic={TOPIC}&quality=7&width=64&height=48&invert",
-            Request("snapshot", TOPIC, Form(7, 64, 48, inverted=True)),
+            PictureRequest("snapshot", TOPIC, PictureFormat(7, 64, 48, inverted=True)),
         ),
         (
             f"/stream?topic={TOPIC}&type=ros_compressed&quality=7",
-            Request("stream", TOPIC),
+            PictureRequest("stream", TOPIC),
         ),
     ],
 )
@@ -81,7 +90,7 @@ def test_the_addresses_of_web_video_server_are_accepted(target, request_):
     ],
 )
 def test_an_invalid_request_target_is_refused_with_a_reason(target, status, expected):
-    with pytest.raises(Refusal) as refused:
+    with pytest.raises(HttpError) as refused:
         asked(target)
     assert refused.value.status == status
     assert expected in str(refused.value)
@@ -98,7 +107,7 @@ def test_an_invalid_request_target_is_refused_with_a_reason(target, status, expe
     ],
 )
 def test_a_malformed_or_non_get_request_is_refused(head, status):
-    with pytest.raises(Refusal) as refused:
+    with pytest.raises(HttpError) as refused:
         read_request(head)
     assert refused.value.status == status
     assert str(refused.value).isprintable()
@@ -120,12 +129,12 @@ def opened(jpeg):
 
 
 def test_a_picture_gets_the_requested_size_quality_and_orientation():
-    shown = opened(Form(width=64, height=10, inverted=True).apply(a_picture()))
+    shown = opened(PictureFormat(width=64, height=10, inverted=True).apply(a_picture()))
     assert shown.size == (64, 10)
     red, _, blue = shown.getpixel((5, 1))
     assert blue > 200 > 50 > red
-    assert opened(Form(width=64).apply(a_picture())).size == (64, 20)
-    least, most = (len(Form(quality=q).apply(a_picture())) for q in (1, 100))
+    assert opened(PictureFormat(width=64).apply(a_picture())).size == (64, 20)
+    least, most = (len(PictureFormat(quality=q).apply(a_picture())) for q in (1, 100))
     assert least < most
 
 
@@ -134,7 +143,7 @@ def test_a_picture_gets_the_requested_size_quality_and_orientation():
 )
 def test_unreadable_or_too_large_image_data_is_refused(data):
     with pytest.raises(NoPicture):
-        Form(quality=50).apply(data)
+        PictureFormat(quality=50).apply(data)
 
 
 class Served:
@@ -273,7 +282,7 @@ def test_a_reader_that_reads_nothing_is_disconnected(monkeypatch):
         stuck.connect(("127.0.0.1", served.port))
         stuck.sendall(f"GET {STREAM} HTTP/1.0\r\n\r\n".encode())
         await until(lambda: served.watchers == 1)
-        monkeypatch.setattr(server, "PATIENCE", 0.05)
+        monkeypatch.setattr(web_video, "PATIENCE", 0.05)
         served.send(b"\xff\xd8\xff" + bytes(1 << 20))
         await until(lambda: served.watchers == 0)
         stuck.close()
@@ -302,7 +311,7 @@ def test_a_reader_that_reads_nothing_is_disconnected(monkeypatch):
 )
 def test_a_refusal_is_sent_to_the_client(monkeypatch, sent, status, expected):
     if "0.1 s" in expected:  # the others must be in time on a busy machine, too
-        monkeypatch.setattr(server, "PATIENCE", 0.1)
+        monkeypatch.setattr(web_video, "PATIENCE", 0.1)
 
     async def scenario(served):
         reader, writer = await asyncio.open_connection("127.0.0.1", served.port)
@@ -317,7 +326,7 @@ def test_a_refusal_is_sent_to_the_client(monkeypatch, sent, status, expected):
 
 
 def test_a_client_above_the_connection_limit_is_refused(monkeypatch):
-    monkeypatch.setattr(server, "MOST_CONNECTIONS", 2)
+    monkeypatch.setattr(web_video, "MOST_CONNECTIONS", 2)
 
     async def scenario(served):
         writers = [(await served.connect(STREAM))[1] for _ in range(2)]

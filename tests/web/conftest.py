@@ -1,19 +1,14 @@
 """A real Chromium and a small display."""
 
-import sys
 from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 from fake_drive import FakeDrive
 from input_bench import Bench
 from playwright.sync_api import Browser, Page
-from scene_host import SceneHost
 
-from real_browser import watched_tab
-
-# A browser with pages that can be hidden is in the tests of the browser.
-sys.path.append(str(Path(__file__).parents[1] / "browser"))
+from equipment.chromium import watched_tab
+from equipment.scene_host import SceneHost
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from contextlib import suppress
 from fake_drive import FakeDrive
 from playwright.sync_api import Browser, Page
 
-from real_browser import Complaints
+from equipment.chromium import Complaints
 
 INPUT_BLOCKERS = {
     "blur": "window.dispatchEvent(new Event('blur'))",

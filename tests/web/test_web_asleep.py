@@ -6,9 +6,9 @@ import time
 from contextlib import contextmanager
 
 import pytest
-from devtools import Chromium
-from scene_host import wait
 
+from equipment.devtools import Chromium
+from equipment.scene_host import wait
 from webmap.scene.wire.session import SceneSession
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]

@@ -3,8 +3,8 @@
 import struct
 
 import pytest
-from scene_host import wait
 
+from equipment.scene_host import wait
 from webmap.scene import svg
 from webmap.scene.node import Fragment
 from webmap.scene.wire.messages import ElementEvent

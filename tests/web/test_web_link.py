@@ -1,8 +1,8 @@
 """The link of a page to its display, in a real Chromium."""
 
 import pytest
-from scene_host import wait
 
+from equipment.scene_host import wait
 from webmap.scene.wire.messages import Trouble, ViewReport
 from webmap.scene.wire.opcodes import VERSION
 from webmap.scene.wire.session import SceneSession

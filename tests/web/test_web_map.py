@@ -3,8 +3,8 @@
 import math
 
 import pytest
-from scene_host import wait
 
+from equipment.scene_host import wait
 from webmap.scene.wire.messages import ModuleMessage, ModuleReady, Trouble, ViewReport
 
 pytestmark = pytest.mark.browser

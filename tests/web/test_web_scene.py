@@ -4,8 +4,8 @@ import math
 import struct
 
 import pytest
-from scene_host import wait
 
+from equipment.scene_host import wait
 from webmap.base.geometry import Affine
 from webmap.scene import html, svg
 from webmap.scene.node import Fragment

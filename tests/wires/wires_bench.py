@@ -16,7 +16,7 @@ from wires_tap import FROM_GATE, Tap, lanes_of, settled
 import webmap
 from webmap.core.runtime import runtime
 
-sys.path.append(str(Path(__file__).parents[1] / "server"))
+sys.path.append(str(Path(__file__).parents[1]))
 
 PATIENCE = 10.0
 """Seconds until a wait times out."""
@@ -48,8 +48,7 @@ class Bench:
         self._open = contextlib.ExitStack()
 
     def __enter__(self):
-        from server_fakes import running
-
+        from equipment.server_fakes import running
         from webmap.core.base_page import Viewer
 
         def authenticate(scope):

@@ -18,7 +18,7 @@ from webmap.cli.demo_robots import FREE, demo_robot
 from webmap.cli.options import PORT, Finite, simulator_options, web_options
 
 if TYPE_CHECKING:
-    from webmap.sim.proxy import FaultProxy
+    from webmap.testing.fault_proxy import FaultProxy
 
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -79,7 +79,7 @@ def bad_link(url: str, delay: float, jitter: float, stall: float) -> Iterator[st
     if port is None or not (delay or jitter or stall):
         yield url
         return
-    from webmap.sim.proxy import FaultProxy, Shape
+    from webmap.testing.fault_proxy import FaultProxy, Shape
 
     with FaultProxy(port) as proxy:
         proxy.shape(Shape(latency=delay / 1000, jitter=jitter / 1000))

@@ -5,8 +5,7 @@ serve: ``import webmap`` loads none of it. What a page shows and does is decided
 in :mod:`webmap.core` and :mod:`webmap.scene.wire`; what moves a robot, in the gate.
 
 Begin with ``app``, which routes requests: ``security`` and ``access`` let them in,
-``scene_socket`` and ``drive_socket`` serve a page's sockets, ``open_pages`` has the
-pages, and ``html``, ``files`` and ``own_files`` are what browsers load, which
-``modules`` and ``packed`` make small. ``application`` has the public functions, and
-``runner`` is the server that they run.
+``sockets`` serves a page's two sockets, ``open_pages`` has the pages, and ``html``,
+``files`` and ``own_files`` are what browsers load; ``bundles`` makes few files of many.
+``application`` has the public functions, and ``runner`` is the server that they run.
 """

@@ -17,15 +17,23 @@ from starlette.types import Receive, Scope, Send
 from webmap.core.base_page import PageEntry
 from webmap.core.page import Site
 from webmap.server.access import Settings
-from webmap.server.drive_socket import ConnectToGate, DriveSockets
-from webmap.server.files import FILES, IMAGES, File, NoSuchFile, Published, read_below
+from webmap.server.files import (
+    FILES,
+    IMAGES,
+    File,
+    GzipCache,
+    NoSuchFile,
+    Published,
+    accepts_gzip,
+    is_worth_compressing,
+    read_below,
+)
 from webmap.server.html import FOLDER, base_of, make_page, prepare_page
 from webmap.server.open_pages import OpenPages
 from webmap.server.outbox import BatchedCallsByLoop
 from webmap.server.own_files import own_files
-from webmap.server.packed import Packed, accepts_gzip, may_pack
-from webmap.server.scene_socket import SceneSockets, find_page
 from webmap.server.security import PAGE_KEY, SANDBOX, Security, plain
+from webmap.server.sockets import ConnectToGate, DriveSockets, SceneSockets, find_page
 
 log = logging.getLogger("webmap.server")
 
@@ -61,7 +69,7 @@ class WebApp:
     ) -> None:
         self.settings = settings = settings or Settings()
         self.published = published or Published()
-        self._packed = Packed()
+        self._gzip = GzipCache()
         calls = BatchedCallsByLoop()
         scene = SceneSockets(site, pages, calls, settings.max_pages)
         drive = DriveSockets(pages, connect_to_gate, calls, settings.max_pages)
@@ -72,7 +80,7 @@ class WebApp:
             Route(FILES + "{name:path}", self._published_file),
             Route(IMAGES + "{tag}", self._published_image),
             Route("/_webmap/{name:path}", self._static),
-            Route("/{path:path}", PageAnswers(site, self._packed)),
+            Route("/{path:path}", PageAnswers(site, self._gzip)),
         ]
         self._security = Security(
             Starlette(
@@ -93,19 +101,15 @@ class WebApp:
 
     async def _static(self, request: Request) -> Response:
         name = request.path_params["name"]
-        return await answer_file(request, self._packed, lambda: own_files.file(name))
+        return await answer_file(request, self._gzip, lambda: own_files.file(name))
 
     async def _published_file(self, request: Request) -> Response:
         name = request.path_params["name"]
-        return await answer_file(
-            request, self._packed, lambda: self.published.file(name)
-        )
+        return await answer_file(request, self._gzip, lambda: self.published.file(name))
 
     async def _published_image(self, request: Request) -> Response:
         tag = request.path_params["tag"]
-        return await answer_file(
-            request, self._packed, lambda: self.published.image(tag)
-        )
+        return await answer_file(request, self._gzip, lambda: self.published.image(tag))
 
 
 async def _key_fits(request: Request) -> Response:
@@ -133,24 +137,24 @@ async def _answer_error(request: Request, error: Exception) -> Response:
 
 
 async def answer_file(
-    request: Request, packed: Packed, read: Callable[[], File]
+    request: Request, cache: GzipCache, read: Callable[[], File]
 ) -> Response:
     """Answer with a file, or with status 304 if the browser has it.
 
     Args:
         request: The request.
-        packed: The files that were compressed before.
+        cache: The files that were compressed before.
         read: Called in another thread; may raise :class:`NoSuchFile`.
 
     Raises:
         HTTPException: With status 404, if there is no such file.
 
     """
-    return await asyncio.to_thread(_answer_file, request, packed, read)
+    return await asyncio.to_thread(_answer_file, request, cache, read)
 
 
 def _answer_file(
-    request: Request, packed: Packed, read: Callable[[], File]
+    request: Request, cache: GzipCache, read: Callable[[], File]
 ) -> Response:
     try:
         file = read()
@@ -168,20 +172,20 @@ def _answer_file(
     if tag in request.headers.get("if-none-match", ""):
         return Response(status_code=304, headers=headers)
     data = file.data
-    if not file.fleeting and may_pack(file.media_type, len(data)):
+    if not file.fleeting and is_worth_compressing(file.media_type, len(data)):
         headers["vary"] = "accept-encoding"
         if accepts_gzip(request.headers.get("accept-encoding", "")):
             headers["content-encoding"] = "gzip"
-            data = packed.of(data)
+            data = cache.compressed(data)
     return Response(data, media_type=file.media_type, headers=headers)
 
 
 class PageAnswers:
     """Serves all paths that are not WebMap's own: pages, and files in their folders."""
 
-    def __init__(self, site: Site, packed: Packed) -> None:
+    def __init__(self, site: Site, cache: GzipCache) -> None:
         self._site = site
-        self._packed = packed
+        self._gzip = cache
         self._warned: dict[Path, list[str]] = {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -201,7 +205,7 @@ class PageAnswers:
             root = base_of(request.scope.get("root_path", "")).removesuffix(FOLDER)
             return RedirectResponse(root + entry.path, 308)
         return await answer_file(
-            request, self._packed, lambda: self._folder_file("/" + path)
+            request, self._gzip, lambda: self._folder_file("/" + path)
         )
 
     async def _page(self, request: Request, entry: PageEntry) -> Response:
@@ -231,7 +235,7 @@ class PageAnswers:
         if accepts_gzip(request.headers.get("accept-encoding", "")):
             headers["content-encoding"] = "gzip"
             # A page with a key is sent once, and the key is not stored.
-            data = gzip.compress(data) if key else self._packed.of(data)
+            data = gzip.compress(data) if key else self._gzip.compressed(data)
         return HTMLResponse(data, headers=headers)
 
     def _folder_file(self, path: str) -> File:

@@ -166,9 +166,14 @@ def _serve(
     max_pages: int,
 ) -> None:
     from webmap.server.access import Settings
-    from webmap.server.opening import opened
     from webmap.server.origins import Hosts
-    from webmap.server.runner import announce, check_exposure, listen, serve
+    from webmap.server.runner import (
+        announce,
+        browser_at,
+        check_exposure,
+        listen,
+        serve,
+    )
 
     # Check everything that can be refused before anything starts.
     check_exposure(host, insecure_lan=insecure_lan)
@@ -185,7 +190,7 @@ def _serve(
     def ready(url: str) -> None:
         announce(url)
         if open_browser:
-            browser.enter_context(opened(url.partition("?")[0], app.new_code()))
+            browser.enter_context(browser_at(url.partition("?")[0], app.new_code()))
 
     try:
         runtime.start()

@@ -109,7 +109,7 @@ class Codes:
         self._ends: OrderedDict[str, float] = OrderedDict()
 
     def issue(self, now: float) -> str:
-        """Return a new code."""
+        """Return a new code, valid from ``now``, in seconds of any clock."""
         code = secrets.token_urlsafe(16)
         self._ends[code] = now + self._life
         if len(self._ends) > self._limit:

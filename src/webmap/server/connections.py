@@ -83,7 +83,7 @@ class Waiting(Generic[T]):
         return gone
 
     def remove(self, connection: T, address: str) -> None:
-        """Remove a waiting connection."""
+        """Remove a connection, because it is served or has ended."""
         mine = self._by_address[address]
         del mine[connection]
         self._count -= 1
@@ -169,7 +169,7 @@ class HttpConnection:
             self._rest()
 
     def ended(self) -> None:
-        """Set that the connection has ended."""
+        """Called when the transport is closed: the connection waits no longer."""
         self._ended = True
         self._leave()
 

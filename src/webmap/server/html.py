@@ -12,11 +12,11 @@ from html.parser import HTMLParser
 from urllib.parse import quote
 
 from webmap.server.access import KEY
-from webmap.server.modules import STARTS
+from webmap.server.bundles import STARTS
 from webmap.server.own_files import FOLDERS
 
 NEXT = "webmap-next"
-"""The relation of links to the modules that opening.js loads."""
+"""The relation of links to the bundles that opening.js loads."""
 
 FOLDER = "/_webmap/"
 """The path of WebMap's own files and sockets, under the application's root."""
@@ -71,7 +71,7 @@ def make_page(title: str, base: str, key: str | None = None) -> str:
 
 
 def _preloads(base: str) -> str:
-    """Return the elements with which a browser loads modules at once, not in turn.
+    """Return the elements with which a browser loads bundles at once, not in turn.
 
     First those of the picture, with the style sheets. When these are there, opening.js
     makes the browser load the others.

@@ -189,7 +189,7 @@ class PageHost:
             self._show()
 
     def build(self, sizes: Sizes) -> None:
-        """Build the page and show it."""
+        """Call the page's function, and send the first frame at once."""
         self._open(sizes)
         self._show()
 
@@ -231,7 +231,7 @@ class PageHost:
             self.tick(time.monotonic())
 
     def close(self) -> None:
-        """Close the page permanently."""
+        """Forget the page and what its function made; its socket is closed."""
         self._stop_watching()
         self._stay()
         self._pages.forget(self._key, self, built=self._page is not None)
@@ -389,7 +389,7 @@ class OpenPages:
     # In the model's thread.
 
     def count_refused(self, viewer: Viewer, last: str) -> None:
-        """Count a refused message of a page."""
+        """Add a refused message to the problems of the system, with its reason."""
         refusals.note(viewer.name, 1, last, datetime.now(UTC))
 
     def host(self, key: PageKey, viewer: Viewer) -> PageHost:

@@ -13,8 +13,8 @@ import re
 import threading
 from pathlib import Path
 
+from webmap.server.bundles import served_modules, served_sheets
 from webmap.server.files import MEDIA_TYPES, File, NoSuchFile
-from webmap.server.modules import served_modules, served_sheets
 
 PACKAGE = Path(__file__).parents[1]
 

@@ -1,7 +1,7 @@
 """The WebSockets of pages: bounded in both directions, and always closed with a reason.
 
 Here are the open sockets, the limits of each, and how one is read and written. The two
-sockets of a page are in ``scene_socket`` and ``drive_socket``.
+sockets of a page are in ``sockets``.
 """
 
 import asyncio

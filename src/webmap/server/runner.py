@@ -1,17 +1,29 @@
-"""The web server: uvicorn, configured for small messages."""
+"""The web server: uvicorn, configured for small messages; and the browser of its user.
+
+Every user of a machine can read the command line of every process. So the browser gets
+the name of a file that only its owner can read, and the file redirects to the page.
+"""
 
 import asyncio
+import contextlib
 import logging
 import os
 import socket
-from collections.abc import Callable
+import tempfile
+import threading
+import webbrowser
+from collections.abc import Callable, Iterator
+from html import escape
+from pathlib import Path
 from types import FrameType
 
 import uvicorn
 
 from webmap.base.errors import ConfigError, WebMapError
 from webmap.base.processes import return_large_pieces, why_not_listening
+from webmap.server.access import CODE
 from webmap.server.app import WebApp
+from webmap.server.auth import CODE_LIFE_S
 from webmap.server.connections import protocols
 from webmap.server.origins import WILDCARD, is_loopback
 from webmap.server.own_files import own_files
@@ -194,3 +206,61 @@ class Server(uvicorn.Server):
         del sig, frame
         self.force_exit = self.should_exit
         self.should_exit = True
+
+
+_HTML = """<!doctype html>
+<html lang="en">
+<meta charset="utf-8">
+<meta name="referrer" content="no-referrer">
+<meta http-equiv="refresh" content="0;url={url}">
+<title>WebMap</title>
+<p>This link opens <a href="{url}">WebMap</a>, once.</p>
+</html>
+"""
+
+
+@contextlib.contextmanager
+def browser_at(url: str, code: str) -> Iterator[None]:
+    """Open a page in a browser, and keep the file for it while the block runs.
+
+    The file is removed at the end of the block, or when its code has expired.
+
+    Args:
+        url: The URL of the page, without a query.
+        code: A one-time code that signs in.
+
+    """
+    file = _write(_HTML.format(url=escape(f"{url}?{CODE}={code}")))
+    if file is None:
+        logging.getLogger("webmap").warning(
+            "no browser is opened, as no file can be written in the home folder or in "
+            "%s: open the printed address yourself",
+            tempfile.gettempdir(),
+        )
+        yield
+        return
+    timer = threading.Timer(CODE_LIFE_S, file.unlink, [True])
+    timer.daemon = True
+    timer.start()
+    # Some browsers return only when they are closed.
+    browser = threading.Thread(
+        target=webbrowser.open, args=(file.as_uri(),), daemon=True
+    )
+    browser.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        file.unlink(missing_ok=True)
+
+
+def _write(html: str) -> Path | None:
+    # Browsers installed as snaps cannot read hidden folders or the folder for temporary
+    # files.
+    for folder in (Path.home(), Path(tempfile.gettempdir())):
+        with contextlib.suppress(OSError):
+            number, name = tempfile.mkstemp(".html", "webmap-sign-in-", folder)
+            with os.fdopen(number, "w", encoding="utf-8") as file:
+                file.write(html)
+            return Path(name)
+    return None

@@ -6,7 +6,7 @@ from typing import Any
 
 from webmap.ros.rosbridge.server.encode import Publication
 from webmap.ros.rosbridge.server.graph import GoalHandle, Respond
-from webmap.sim.graph_node import GraphNode
+from webmap.sim.messages import GraphNode
 from webmap.sim.navigator import GoalState, SimGoal
 
 _ACTIONLIB_STATUS = {
@@ -53,7 +53,7 @@ class ActionlibServer:
         ):
             graph.advertise(owner, f"{self.topic}/{part}", type_name, node=name)
         graph.subscribe(
-            owner, f"{self.topic}/goal", self._on_goal, f"{kind}Goal", node=name
+            owner, f"{self.topic}/goal", self._on_goal, f"{kind}SimGoal", node=name
         )
         graph.subscribe(
             owner,

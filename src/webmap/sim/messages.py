@@ -1,6 +1,13 @@
-"""The messages of the simulated robots, in one dialect of ROS."""
+"""The messages of the simulated robots in one dialect of ROS, and the node with topics.
 
+``Messages`` makes messages, ``GraphNode`` publishes them, and ``Feed`` is a topic
+that every robot has.
+"""
+
+import logging
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,12 +15,13 @@ from numpy.typing import NDArray
 
 from webmap.base.geometry import Pose, Quaternion
 from webmap.ros.rosbridge.server.dialect import Dialect
+from webmap.ros.rosbridge.server.graph import Deliver, Graph
 from webmap.ros.tf import Transform
 from webmap.sim.maps import FloorPlan
-from webmap.sim.mounts import LASER_HEIGHT, mount
 from webmap.sim.planner import Point
 from webmap.sim.robot import SimRobot
-from webmap.sim.scanner import ScannerOptions
+from webmap.sim.scanner import LASER_HEIGHT, ScannerOptions, mount
+from webmap.sim.world import World
 
 Message = dict[str, Any]
 
@@ -245,3 +253,71 @@ def quaternion(yaw: float) -> Message:
 def float32(value: float) -> float:
     """Return the nearest value that a float32 field can store."""
     return float(np.float32(value))
+
+
+log = logging.getLogger("webmap.sim")
+
+NODE = "/robots"
+
+
+class GraphNode:
+    """Publishes and subscribes for simulated robots.
+
+    Args:
+        world: The robots.
+        graph: The ROS graph with their topics.
+        tilted: Whether their lasers are mounted upside down, and they have a depth
+            camera whose cloud is in its optical frame.
+
+    """
+
+    def __init__(self, world: World, graph: Graph, *, tilted: bool = False) -> None:
+        self.world = world
+        self.graph = graph
+        self.tilted = tilted
+        self.messages = Messages(graph.schema.dialect, nan=world.options.scanner.nan)
+        self.on_step: list[Callable[[], None]] = []
+        """Called five times a second: the actions report the state of their goals."""
+
+    def target(self, pose_stamped: dict[str, Any], index: int) -> Pose | None:
+        """Return a goal in the map's frame; None if its frame is unknown."""
+        at = read_pose(pose_stamped["pose"])
+        frame = pose_stamped["header"]["frame_id"].strip("/")
+        robot = self.world.robots[index]
+        if at is None or frame in ("", "map"):
+            return at
+        if frame in ("odom", f"{robot.frames}odom"):
+            return robot.pose @ robot.odometry.inverse @ at
+        log.warning("%s: a goal in an unknown frame %r", robot.name, frame)
+        return None
+
+    def publish(self, topic: str, message: dict[str, Any]) -> None:
+        """Publish on a topic of this node."""
+        self.graph.publish(self, topic, message)
+
+    def advertise(self, topic: str, type_name: str, *, latch: bool = False) -> None:
+        """Advertise a topic of this node."""
+        self.graph.advertise(self, topic, type_name, node=NODE, latch=latch)
+
+    def subscribe(self, topic: str, type_name: str, callback: Deliver) -> None:
+        """Subscribe this node to a topic."""
+        self.graph.subscribe(self, topic, callback, type_name, node=NODE)
+
+
+Make = Callable[[int, str, float], Message | None]
+"""Makes a robot's message from its index, the topic's name and the stamp."""
+
+
+@dataclass(frozen=True, slots=True)
+class Feed:
+    """A topic that every robot has, in its own namespace."""
+
+    topic: str
+    """The name without the robot's namespace and the slash."""
+
+    type: str
+    period: float
+    """Seconds between two messages."""
+
+    make: Make
+    """Called only while the topic has subscribers; None if there is no message."""

@@ -9,10 +9,16 @@ from webmap.ros.rosbridge.server.encode import Publication
 from webmap.ros.rosbridge.server.graph import Graph, Respond
 from webmap.ros.rosbridge.server.quirks import Quirks
 from webmap.sim.actions import ActionlibServer, NavigateToPose
-from webmap.sim.feeds import Feeds, depth, sonar
-from webmap.sim.graph_node import NODE, GraphNode
-from webmap.sim.mounts import OVER, mount, overhead
+from webmap.sim.feeds import Feeds
+from webmap.sim.feeds.sensors import (
+    CAMERA_FRAME,
+    CAMERA_POSE,
+    SONAR_FRAME,
+    SONAR_POSE,
+)
+from webmap.sim.messages import NODE, GraphNode
 from webmap.sim.navigator import SimGoal
+from webmap.sim.scanner import OVER, mount, overhead
 from webmap.sim.world import World
 
 log = logging.getLogger("webmap.sim")
@@ -64,10 +70,10 @@ class RobotsNode(GraphNode):
         self._paths_seen = [0 for _ in world.robots]
         self._feeds = Feeds(self, STEP) if extras else None
         if self._feeds is not None:
-            self.messages.mounted[sonar.FRAME] = mount(sonar.MOUNTED.x, 0.15)
+            self.messages.mounted[SONAR_FRAME] = mount(SONAR_POSE.x, 0.15)
         if tilted:
             self.messages.mounted["base_laser"] @= OVER
-            self.messages.mounted[depth.FRAME] = depth.MOUNTED
+            self.messages.mounted[CAMERA_FRAME] = CAMERA_POSE
 
     def start(self) -> None:
         """Advertise topics, subscribe to topics and serve services."""

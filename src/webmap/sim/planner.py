@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from webmap.sim.obstacles import Obstacles, dilate
+from webmap.sim.maps import Obstacles, dilate
 
 Point = tuple[float, float]
 

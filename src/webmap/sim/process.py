@@ -65,7 +65,7 @@ async def run_simulator(
             :func:`webmap.ros.rosbridge.server.quirks.parse_quirks`.
         wander: Whether robots without commands drive to random places.
         errands: Number of robots that go from station to station on their own, the
-            last ones; see :mod:`webmap.sim.errands`.
+            last ones; see :mod:`webmap.sim.navigator`.
         low_battery: Whether the last robot starts with a low battery.
         flat: Whether the only robot has its topics without a prefix: ``/odom``.
         extras: Whether robots have costmaps, clouds, footprints, particles, sonars,

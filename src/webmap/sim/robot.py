@@ -19,7 +19,7 @@ _LOWEST_CHARGE = 0.05
 
 @dataclass(frozen=True, slots=True)
 class BaseOptions:
-    """The properties of a base."""
+    """The properties of a base: what it accepts, and how it moves."""
 
     radius: float = 0.25
     """Radius of its round footprint, in metres."""

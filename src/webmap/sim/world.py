@@ -12,10 +12,8 @@ from PIL import Image
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Pose, Twist
-from webmap.sim.errands import Errands
-from webmap.sim.maps import FloorPlan
-from webmap.sim.navigator import Navigator, SimGoal
-from webmap.sim.obstacles import Obstacles
+from webmap.sim.maps import FloorPlan, Obstacles
+from webmap.sim.navigator import Errands, Navigator, SimGoal
 from webmap.sim.planner import Planner
 from webmap.sim.robot import BaseOptions, SimRobot
 from webmap.sim.scanner import (

@@ -2,13 +2,21 @@
 
 A :class:`WitnessRobot` records its commands with times, a :class:`FaultProxy` adds
 network faults, :func:`check_invariants` reports violations in sentences, and a
-:class:`Sentinel` measures how late the machine itself was in the same seconds.
+:class:`Sentinel` measures how late the machine itself was in the same seconds. Open
+``witness`` first.
 """
 
-from webmap.sim.proxy import FaultProxy, Shape
-from webmap.testing.invariants import Bounds, Quiet, check_invariants
-from webmap.testing.log import ClientMessage, Moved, ReceivedTwist, WitnessLog
-from webmap.testing.sentinel import Sentinel
+from webmap.testing.fault_proxy import FaultProxy, Shape
+from webmap.testing.invariants import (
+    Bounds,
+    ClientMessage,
+    Moved,
+    Quiet,
+    ReceivedTwist,
+    Sentinel,
+    WitnessLog,
+    check_invariants,
+)
 from webmap.testing.witness import WitnessRobot
 
 __all__ = [

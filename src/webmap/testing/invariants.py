@@ -1,15 +1,182 @@
-"""The invariants of all velocities that a robot received, despite any fault. No I/O.
+"""What a test recorded, and the invariants that it must keep despite any fault.
 
-Each rule checks the received velocities, oldest first, and reports violations in
-sentences; times in them are seconds since the first velocity.
+A witness records messages and velocities, and a sentinel how late the machine was
+meanwhile. Each rule checks the received velocities, oldest first, and reports
+violations in sentences; times in them are seconds since the first velocity.
 """
 
 import itertools
 import math
+import threading
+import time
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
 
-from webmap.testing.log import ReceivedTwist
+from webmap.base.geometry import Twist
+
+
+@dataclass(frozen=True, slots=True)
+class ClientMessage:
+    """One message of a client."""
+
+    at: float
+    """Seconds of the monotonic clock."""
+
+    link: int
+    """Number of its WebSocket, counted from 1."""
+
+    message: dict[str, Any]
+
+    @property
+    def op(self) -> Any:
+        """The operation of the message, such as ``publish``."""
+        return self.message.get("op")
+
+    @property
+    def topic(self) -> Any:
+        """The topic, if the message has one."""
+        return self.message.get("topic")
+
+
+@dataclass(frozen=True, slots=True)
+class ReceivedTwist:
+    """One velocity that the robot received."""
+
+    at: float
+    """Seconds of the monotonic clock."""
+
+    twist: Twist
+    link: int = 1
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether it stops the robot."""
+        return self.twist.is_zero
+
+    @property
+    def speed(self) -> float:
+        """Metres per second, in any direction."""
+        return self.twist.speed
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """The velocity of the wheels at a time."""
+
+    at: float
+    twist: Twist
+
+
+@dataclass
+class WitnessLog:
+    """All records of a witness, oldest first; may be read while it grows."""
+
+    messages: list[ClientMessage] = field(default_factory=list)
+    twists: list[ReceivedTwist] = field(default_factory=list)
+    moved: list[Moved] = field(default_factory=list)
+
+    def of(self, op: str, topic: str | None = None) -> list[ClientMessage]:
+        """Return the messages with an operation, and with a topic if given."""
+        return [
+            message
+            for message in list(self.messages)
+            if message.op == op and topic in (None, message.topic)
+        ]
+
+    def first_zero(self, since: float) -> float | None:
+        """Return the time of the first zero after ``since``."""
+        return next((t.at for t in _from(self.twists, since) if t.is_zero), None)
+
+    def moving_since(
+        self, since: float, until: float = math.inf
+    ) -> list[ReceivedTwist]:
+        """Return the nonzero velocities of a period."""
+        return [t for t in _from(self.twists, since) if t.at < until and not t.is_zero]
+
+    def standstill(self, since: float, slow: float = 0.01) -> float | None:
+        """Return when the wheels came to rest after ``since`` and stayed at rest.
+
+        Args:
+            since: Seconds of the monotonic clock.
+            slow: Metres or radians per second that count as rest.
+
+        """
+        rest = None
+        for moved in _from(self.moved, since):
+            if max(moved.twist.speed, moved.twist.turn) > slow:
+                rest = None
+            elif rest is None:
+                rest = moved.at
+        return rest
+
+
+Record = TypeVar("Record", ReceivedTwist, Moved)
+
+
+def _from(records: list[Record], since: float) -> list[Record]:
+    """Return the records since a time.
+
+    A log grows for the lifetime of a robot, and waiting tests read it repeatedly in the
+    process of the witness: old records must cost nothing.
+    """
+    return records[bisect_left(records, since, key=lambda record: record.at) :]
+
+
+class Sentinel:
+    """Measures scheduling delay while a test measures something else.
+
+    A time limit on a busy machine is the promised limit plus the delay of the machine
+    in the same seconds; this thread sleeps for 5 ms at a time and records how late it
+    wakes.
+    """
+
+    PERIOD = 0.005
+    """Seconds between two wakes."""
+
+    def __init__(self) -> None:
+        self._late: list[tuple[float, float]] = []
+        self._end = threading.Event()
+        self._thread = threading.Thread(
+            target=self._watch, name="sentinel", daemon=True
+        )
+
+    def __enter__(self) -> "Sentinel":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._end.set()
+        self._thread.join(5)
+
+    def worst(self, since: float, until: float | None = None) -> float:
+        """Return the longest delay in a period of the monotonic clock, in seconds."""
+        until = time.monotonic() if until is None else until
+        return max((late for _, late in self._between(since, until)), default=0.0)
+
+    def stolen(self, since: float, until: float | None = None) -> float:
+        """Return the total waiting time of a ready thread in a period, in seconds.
+
+        Data that passes several threads and processes waits in each of them, so this is
+        the time that a busy machine can add from end to end. A wake that is at most
+        1 ms late is normal on an idle machine and does not count.
+        """
+        until = time.monotonic() if until is None else until
+        return sum(late for _, late in self._between(since, until) if late > 0.001)
+
+    def _between(self, since: float, until: float) -> list[tuple[float, float]]:
+        """Return the wakes that were due in a period, each with its delay."""
+        first = bisect_left(self._late, (since, 0.0))
+        return [(at, late) for at, late in self._late[first:] if at <= until + late]
+
+    def _watch(self) -> None:
+        while not self._end.is_set():
+            due = time.monotonic() + self.PERIOD
+            time.sleep(self.PERIOD)
+            now = time.monotonic()
+            self._late.append((now, max(0.0, now - due)))
+
 
 BREATH = 0.5
 """Seconds without a velocity that separate two activities."""

@@ -14,7 +14,7 @@ from websockets.exceptions import ConnectionClosed
 from webmap.base.geometry import Pose, Twist
 from webmap.base.tasks import LoopThread
 from webmap.sim.robot import BaseOptions, SimRobot
-from webmap.testing.log import ClientMessage, Moved, ReceivedTwist, WitnessLog
+from webmap.testing.invariants import ClientMessage, Moved, ReceivedTwist, WitnessLog
 
 OnMessage = Callable[[int, dict[str, Any]], None]
 

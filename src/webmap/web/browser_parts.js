@@ -1,5 +1,5 @@
 import { OWN_FILES, resolve } from "./access.js";
-import { PARTS, PART_FOLDERS, PART_SHEETS } from "./constants.js";
+import { FIRST_PARTS, PARTS, PART_FOLDERS, PART_SHEETS } from "./constants.js";
 
 /** @typedef {import('./map.js').MapCanvas} MapCanvas */
 
@@ -26,6 +26,9 @@ import { PARTS, PART_FOLDERS, PART_SHEETS } from "./constants.js";
  * @property {() => void} onStyles Called when a style sheet was loaded.
  */
 
+/** The bundle of each browser part that a page starts with: STOP and driving. */
+const FIRST = new Map(Object.entries(FIRST_PARTS));
+
 /** Milliseconds for which the other parts wait for STOP and driving. */
 const FIRST_PATIENCE = 1000;
 
@@ -38,12 +41,7 @@ export class BrowserParts {
     this._attached = new Map();
     /** @type {Set<string>} */
     this._styles = new Set();
-    const links = document.head.querySelectorAll('link[rel="modulepreload"]');
-    /** @type {Set<string | null>} What the page's HTML loads: STOP and driving. */
-    this._preloaded = new Set(
-      [...links].map((link) => resolve(link.getAttribute("href") ?? "", location.href)),
-    );
-    /** @type {Promise<void>[]} Parts of these modules that are being loaded. */
+    /** @type {Promise<void>[]} STOP and driving, which are being loaded. */
     this._first = [];
     /** @type {(() => Promise<void>)[]} Load the other parts. */
     this._later = [];
@@ -62,9 +60,9 @@ export class BrowserParts {
     const attached = { canvas, part: null, waiting: [] };
     this._attached.set(instance, attached);
     const url = resolve(module, OWN_FILES);
-    const first = this._preloaded.has(url);
-    const part = first ? null : ownPart(url);
-    const style = css ? this._addStyle(part ? PART_SHEETS : css) : null;
+    const part = ownPart(url);
+    const first = part !== null && FIRST.has(part);
+    const style = css ? this._addStyle(part && !first ? PART_SHEETS : css) : null;
     const load = () => {
       if (style) style.link.href = style.url;
       const code = part ? partOf(part) : moduleOf(url);
@@ -166,14 +164,15 @@ function ownPart(url) {
 }
 
 /**
- * Load WebMap's own part of this name, with all the others: one request instead of many.
+ * Load WebMap's own part of this name, with the others of its bundle.
  *
  * @param {string} name
  */
 async function partOf(name) {
-  const { parts } = await importOf(new URL(PARTS, OWN_FILES).href);
-  if (!parts[name]) throw new Error("WebMap has no such module");
-  return parts[name];
+  const bundle = new URL(FIRST.get(name) ?? PARTS, OWN_FILES);
+  const { $modules } = await importOf(bundle.href);
+  if (!$modules[name]) throw new Error("WebMap has no such module");
+  return $modules[name];
 }
 
 /** @param {string | null} url */

@@ -3,11 +3,17 @@
 /** The path of WebMap's own files and sockets on the server. */
 export const FOLDER = "/_webmap/";
 
-/** The module with all of WebMap's own browser parts. */
+/** The bundle with WebMap's other browser parts. */
 export const PARTS = "parts.js";
 
 /** Where their own modules are. */
 export const PART_FOLDERS = Object.freeze(["console/", "features/"]);
+
+/** The bundle of each browser part that a page starts with. */
+export const FIRST_PARTS = Object.freeze({
+  "features/stop/stop_button.js": "web/drive.js",
+  "features/drive/teleop.js": "web/drive.js",
+});
 
 /** The style sheet of these parts. */
 export const PART_SHEETS = "parts.css";

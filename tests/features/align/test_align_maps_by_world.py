@@ -21,9 +21,9 @@ from module_fakes import header, image_of, images, pixel
 from PIL import Image
 from playwright.sync_api import Browser, Page
 
-from real_browser import watched_tab
+from equipment.chromium import watched_tab
+from equipment.webmap_process import page_of
 from webmap.base.geometry import Affine
-from webmap_process import page_of
 
 pytestmark = pytest.mark.slow
 

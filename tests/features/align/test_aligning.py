@@ -13,8 +13,8 @@ from gate_words import TOO_LATE
 from playwright.sync_api import expect
 from websockets.sync.client import connect
 
-from real_browser import watched_tab
-from webmap_process import page_of, simulator
+from equipment.chromium import watched_tab
+from equipment.webmap_process import page_of, simulator
 
 pytestmark = pytest.mark.browser
 

@@ -11,13 +11,13 @@ from types import SimpleNamespace
 import pytest
 from button_robot import robot_node
 
+from equipment.webmap_process import simulator
 from webmap import Bridge, Robot
 from webmap.base.errors import ConfigError
 from webmap.config.buttons import ButtonMistake, read_button
 from webmap.core.base_page import PageEntry
 from webmap.core.page import Page
 from webmap.scene.element import Event
-from webmap_process import simulator
 
 DOCK = {"label": "Dock", "service": "/dock", "type": "std_srvs/Trigger"}
 HORN = {

@@ -9,7 +9,7 @@ import time
 import pytest
 from PIL import Image
 
-from camera_server import BOUNDARY, CameraServer, part
+from equipment.camera_server import BOUNDARY, CameraServer, part
 from webmap import Robot
 from webmap.base.errors import ConfigError
 from webmap.base.lifecycle import Lifecycle

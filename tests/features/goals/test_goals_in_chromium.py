@@ -15,9 +15,9 @@ from gate_words import TOO_LATE
 from playwright.sync_api import Browser, Locator, Page, expect
 from websockets.sync.client import ClientConnection, connect
 
-from real_browser import end_stops, watched_tab
+from equipment.chromium import end_stops, watched_tab
+from equipment.webmap_process import page_of
 from webmap.cli.demo import simulator
-from webmap_process import page_of
 
 # Serial, as the gate refuses a goal that arrives more than 0.3 s late.
 pytestmark = [pytest.mark.browser, pytest.mark.serial]

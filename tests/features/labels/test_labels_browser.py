@@ -11,8 +11,8 @@ from button_robot import robot_node
 from gate_words import TOO_LATE
 from playwright.sync_api import Browser, Page, expect
 
-from real_browser import watched_tab
-from webmap_process import page_of, simulator, webmap
+from equipment.chromium import watched_tab
+from equipment.webmap_process import page_of, simulator, webmap
 
 pytestmark = pytest.mark.browser
 

@@ -25,7 +25,7 @@ from test_layers_poses import covariance, doubtful, polygon, sonar
 from test_layers_robot import scan
 from test_layers_ways import path
 
-from ray_points import points_of
+from equipment.ray_points import points_of
 from webmap.features.layers.laser_scanner import scan_rays
 
 FAR = 1e300

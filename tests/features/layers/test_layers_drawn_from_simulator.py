@@ -20,10 +20,10 @@ from PIL import Image
 from playwright.sync_api import Browser, Page, expect
 from running_simulators import Running, simulators
 
-from real_browser import watched_tab
+from equipment.chromium import watched_tab
+from equipment.webmap_process import page_of
 from webmap.base.geometry import Pose
 from webmap.sim.navigator import SimGoal
-from webmap_process import page_of
 
 pytestmark = pytest.mark.browser
 

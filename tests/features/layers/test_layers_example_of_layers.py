@@ -6,8 +6,8 @@ import pytest
 from playwright.sync_api import Browser
 from running_simulators import simulators
 
-from real_browser import watched_tab
-from webmap_process import page_of
+from equipment.chromium import watched_tab
+from equipment.webmap_process import page_of
 
 pytestmark = pytest.mark.browser
 

@@ -7,9 +7,9 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 from running_simulators import simulators
 
-from real_browser import watched_tab
+from equipment.chromium import watched_tab
+from equipment.webmap_process import webmap
 from webmap.testing import FaultProxy, Shape
-from webmap_process import webmap
 
 pytestmark = pytest.mark.browser
 

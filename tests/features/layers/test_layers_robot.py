@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from module_fakes import dots
 
-from ray_points import points_of
+from equipment.ray_points import points_of
 from webmap import Robot
 from webmap.base.errors import ProtocolError
 from webmap.base.scope import Removal, keep

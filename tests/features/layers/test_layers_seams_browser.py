@@ -11,8 +11,8 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Browser, Page, expect
 
-from real_browser import watched_tab
-from webmap_process import page_of
+from equipment.chromium import watched_tab
+from equipment.webmap_process import page_of
 
 pytestmark = pytest.mark.browser
 

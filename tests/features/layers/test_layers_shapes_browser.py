@@ -10,8 +10,8 @@ from PIL import Image
 from playwright.sync_api import Browser
 from shapes_of_markers import BLUE, RED, SHAPES
 
-from real_browser import watched_tab
-from webmap_process import page_of
+from equipment.chromium import watched_tab
+from equipment.webmap_process import page_of
 
 pytestmark = pytest.mark.browser
 

@@ -8,9 +8,9 @@ from playwright.sync_api import Browser, Page
 from running_simulators import simulators
 from test_layers_drawn_from_simulator import HELPERS, until
 
-from real_browser import watched_tab
+from equipment.chromium import watched_tab
+from equipment.webmap_process import webmap
 from webmap.base.geometry import Pose
-from webmap_process import webmap
 
 pytestmark = pytest.mark.browser
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
-from real_browser import watched_tab
-from webmap_process import page_of
+from equipment.chromium import watched_tab
+from equipment.webmap_process import page_of
 
 pytestmark = pytest.mark.browser
 

@@ -10,9 +10,9 @@ from PIL import Image
 from playwright.sync_api import Browser, Page, expect
 from scene_of_tiles import DATUM, EAST, FIXES, colour, made_tiles, missing, number
 
-from real_browser import watched_tab
+from equipment.chromium import watched_tab
+from equipment.webmap_process import page_of
 from webmap.base.geometry import Affine, LocalPlane
-from webmap_process import page_of
 
 pytestmark = pytest.mark.browser
 

@@ -3,9 +3,9 @@
 import pytest
 from playwright.sync_api import expect
 
-from real_browser import watched_tab
+from equipment.chromium import watched_tab
+from equipment.webmap_process import page_of
 from webmap.base.errors import ConfigError
-from webmap_process import page_of
 
 MANY = """
 import webmap

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from websockets.sync.client import connect
 
-from real_browser import watched_tab
+from equipment.chromium import watched_tab
+from equipment.webmap_process import page_of, simulator
 from webmap.sim.maps import FLOOR, OCCUPIED, load_map
-from webmap_process import page_of, simulator
 
 # The test measures how late the simulator stamps its scans.
 pytestmark = [pytest.mark.browser, pytest.mark.serial]

@@ -7,11 +7,11 @@ import time
 import msgspec
 import pytest
 
+from equipment.webmap_process import simulator
 from webmap import Bridge, Robot
 from webmap.base.errors import ConfigError
 from webmap.base.scope import Removal
 from webmap.poses.frames import frames_of
-from webmap_process import simulator
 
 
 class Listening(Removal):

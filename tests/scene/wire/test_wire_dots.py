@@ -228,7 +228,7 @@ def test_the_reach_contains_all_dots():
         SCAN._replace(place=Affine(0, 1, -1, 0, 3.0, -4.0)),
         SCAN._replace(moved=(0.5, 0.3, 1.0)),
     ):
-        from ray_points import points_of
+        from equipment.ray_points import points_of
 
         farthest = np.hypot(*points_of(scan).T).max()
         assert farthest <= reach_of(scan) <= 2 * farthest + 6

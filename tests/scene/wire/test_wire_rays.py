@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_wire_browser_reads import Decoder
 
-from ray_points import points_of
+from equipment.ray_points import points_of
 from webmap.base.errors import SceneError
 from webmap.base.geometry import Affine
 from webmap.scene import svg

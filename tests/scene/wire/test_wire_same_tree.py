@@ -2,19 +2,13 @@
 
 import base64
 import math
-import sys
-from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
-
-# The scene server is in the folder of the browser's tests.
-sys.path.insert(0, str(Path(__file__).parents[2] / "web"))
-
-from scene_host import SceneHost
 from wire_picture import f32, histories, play
 
-from real_browser import watched_tab
+from equipment.chromium import watched_tab
+from equipment.scene_host import SceneHost
 from webmap.base.geometry import Affine
 from webmap.scene.node import Text
 from webmap.scene.wire.session import SceneSession

@@ -2,19 +2,15 @@
 
 Costmaps, clouds, footprints, particles, covariances, look-ahead points, sonars, fixes,
 markers, diagnostics and logs, under the names of Nav2 and move_base. Each is advertised
-for each robot, and computed only while it has subscribers. Open ``feed`` first.
+for each robot, and computed only while it has subscribers. A topic is a ``Feed`` of
+``webmap.sim.messages``.
 """
 
-from webmap.sim.feeds.cloud import Clouds
-from webmap.sim.feeds.depth import DepthClouds
-from webmap.sim.feeds.feed import Feed
-from webmap.sim.feeds.health import Health
 from webmap.sim.feeds.localization import Localizations, Satellites
-from webmap.sim.feeds.logs import Logs
-from webmap.sim.feeds.marks import MarkerFeed
 from webmap.sim.feeds.navigation import CostmapTopics, Footprints, Lookaheads
-from webmap.sim.feeds.sonar import Sonars
-from webmap.sim.graph_node import GraphNode
+from webmap.sim.feeds.reports import Health, Logs, MarkerFeed
+from webmap.sim.feeds.sensors import Clouds, DepthClouds, Sonars
+from webmap.sim.messages import Feed, GraphNode
 
 
 class Feeds:

@@ -8,9 +8,7 @@ from numpy.typing import NDArray
 
 from webmap.base.geometry import Pose, normalize_angle
 from webmap.ros.rosbridge.server.encode import Publication
-from webmap.sim.feeds.feed import Feed
-from webmap.sim.graph_node import GraphNode
-from webmap.sim.messages import Message, pose, read_pose
+from webmap.sim.messages import Feed, GraphNode, Message, pose, read_pose
 
 PARTICLES = 150
 SURE = (0.12, 0.05, 0.06)

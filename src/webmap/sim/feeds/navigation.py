@@ -12,10 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from webmap.base.geometry import Pose
-from webmap.sim.feeds.feed import Feed
-from webmap.sim.graph_node import GraphNode
-from webmap.sim.messages import Message, float32, vector
-from webmap.sim.obstacles import Obstacles
+from webmap.sim.maps import Obstacles
+from webmap.sim.messages import Feed, GraphNode, Message, float32, vector
 
 LETHAL, INSCRIBED, UNKNOWN = 100, 99, -1
 INFLATION = 0.55
@@ -216,7 +214,7 @@ class CostmapTopics:
         return Costs(world.obstacles, world.options.base.radius)
 
     def start(self) -> None:
-        """Advertise the topics."""
+        """Advertise the local and the global costmap of each robot, with updates."""
         for robot in self._node.world.robots:
             for part in ("local_costmap", "global_costmap"):
                 topic = self._topic(robot.topics, part)

@@ -6,9 +6,9 @@ as ``publish_odom.json``; the name of its file also contains the program that wr
 
 from pathlib import Path
 
-CAPTURED = Path(__file__).parent / "captured"
+CAPTURED = Path(__file__).parents[1] / "captured"
 
-PLAYER = {"module": "frame_player", "cwd": Path(__file__).parent}
+PLAYER = {"module": "equipment.frame_player", "cwd": Path(__file__).parents[1]}
 """The module and the folder with which ``python -m`` starts the player of frames."""
 
 _WRITER = {"ros1": "ujson", "ros2": "ros2"}

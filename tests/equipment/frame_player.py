@@ -1,10 +1,10 @@
 """Plays frames that were captured from a real rosbridge, byte for byte.
 
-``python -m frame_player FILE...``, in the folder of the tests, serves files with one
-frame each: ``*.json`` with a publication or the response of a service, ``*.bin`` with a
-publication as CBOR. Clients get the frames of the topics that they subscribe to, at a
-fixed rate, and the answers of rosapi that were captured with the frames. The player
-ignores all other operations, as the captured servers do.
+``python -m equipment.frame_player FILE...``, in the folder of the tests, serves files
+with one frame each: ``*.json`` with a publication or the response of a service,
+``*.bin`` with a publication as CBOR. Clients get the frames of the topics that they
+subscribe to, at a fixed rate, and the answers of rosapi that were captured with the
+frames. The player ignores all other operations, as the captured servers do.
 """
 
 import argparse
@@ -267,7 +267,7 @@ async def _send_due(
 
 def main() -> int:
     """Run the player and return the exit status."""
-    parser = argparse.ArgumentParser(prog="python -m frame_player")
+    parser = argparse.ArgumentParser(prog="python -m equipment.frame_player")
     parser.add_argument("files", type=Path, nargs="+", help="with one frame each")
     parser.add_argument("--host", default="127.0.0.1")
     parser.add_argument("--port", type=int, default=0)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from webmap_process import simulator
+from equipment.webmap_process import simulator
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
-HERE = str(Path(__file__).parent)
+TESTS = str(Path(__file__).parents[1])
 
 
 @contextmanager
@@ -19,7 +19,7 @@ def webmap(*arguments: str | Path, **environment: str) -> Iterator[str]:
     paths of this process.
     """
     if "PYTHONPATH" in environment:
-        paths = [environment["PYTHONPATH"], HERE, os.getenv("PYTHONPATH")]
+        paths = [environment["PYTHONPATH"], TESTS, os.getenv("PYTHONPATH")]
         environment["PYTHONPATH"] = os.pathsep.join(filter(None, paths))
     with subprocess.Popen(
         [sys.executable, "-m", "webmap", *arguments],

@@ -2,8 +2,8 @@
 
 from contextlib import contextmanager
 
-from real_browser import watched_tab
-from webmap_process import webmap
+from equipment.chromium import watched_tab
+from equipment.webmap_process import webmap
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from playwright.sync_api import Page
 
-from real_browser import end_stops
+from equipment.chromium import end_stops
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

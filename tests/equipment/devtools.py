@@ -18,7 +18,7 @@ from typing import Any
 
 from websockets.sync.client import connect
 
-from real_browser import CHROMIUM_ARGS, chromium_path
+from equipment.chromium import CHROMIUM_ARGS, chromium_path
 
 
 class Tab:

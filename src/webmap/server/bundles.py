@@ -1,0 +1,232 @@
+"""WebMap's own ES modules and style sheets, in few files for browsers.
+
+A page of many small modules waits for one round trip after another, and each request
+costs the browser some milliseconds. So a page loads the bundles of :data:`STARTS` and
+:data:`PARTS`: each has some modules in the order of their imports, every module in a
+function of its own. One object ``$modules`` has the exports of all by name. So every
+module is one instance, also if a page loads a bundle again after a failure: at the
+address of a module within a bundle is a module that exports the same objects, for
+modules of users. The style sheets of features are served as one too.
+
+Comments on lines of their own are left out, and their lines stay empty, so that lines
+have the same numbers everywhere. A source map has the sources as they were written; a
+browser loads it for its debugger only.
+
+The modules are WebMap's own and written in one style, which :func:`served_modules`
+checks: named imports and exports, each on lines of its own. Modules of users are served
+as they are.
+"""
+
+import json
+import posixpath
+import re
+from collections.abc import Mapping, Sequence
+
+STARTS = ("web/opening.js", "web/page.js", "web/drive.js")
+"""The bundles that a page loads first: its first socket, the picture, the connection to
+the gate with STOP and driving.
+
+Each is a module with all that it imports, if no bundle before has it.
+"""
+
+FIRST_PARTS = {
+    "features/stop/stop_button.js": "web/drive.js",
+    "features/drive/teleop.js": "web/drive.js",
+}
+"""The browser parts that these bundles have too."""
+
+PARTS = "parts.js"
+"""The bundle of all others, which a page loads when its first picture is there."""
+
+PART_FOLDERS = ("console/", "features/")
+"""Where the modules of browser parts are, which a page gets from the bundles."""
+
+PART_SHEETS = "parts.css"
+"""The style sheet of the browser parts of :data:`PARTS`."""
+
+SHARED_SHEET = "web/style/controls.css"
+"""The style sheet that those of features import: it stays a file of its own."""
+
+_SHEET_FOLDERS = ("features/", "web/tools/")
+
+_IMPORT = re.compile(r'^import (\{[^}]*\}) from "(\.[^"]+)";$', re.M)
+_EXPORT = re.compile(
+    r"^export (default )?(?=(?:async )?(?:function|class|const) (\w+))", re.M
+)
+_OTHER = re.compile(r"^(?:import|export)\b", re.M)
+_COMMENT = re.compile(r"^[ \t]*(?://.*|/\*[^*]*\*+(?:[^/*][^*]*\*+)*/[ \t]*)$", re.M)
+_SHEET = re.compile(r'((?:@import url\("[^"]+"\);\s*)*)(.*)', re.S)
+
+
+def served_modules(
+    sources: Mapping[str, str], starts: Sequence[str] = STARTS
+) -> dict[str, str]:
+    """Return what is served at the address of each module, and the source maps.
+
+    Args:
+        sources: The text of each module by name, such as ``"web/page.js"``.
+        starts: The bundles that a page loads first.
+
+    Returns:
+        Texts by name, also of :data:`PARTS`. The source map of ``x.js`` is
+        ``x.js.map``.
+
+    Raises:
+        ValueError: If a module has an import or export of another form, imports a
+            module that is not there, or the imports form a circle.
+
+    """
+    bundles: dict[str, str] = {}  # by module, each module after those that it imports
+
+    def add(name: str, bundle: str, users: tuple[str, ...]) -> None:
+        if name in users or name not in sources:
+            raise ValueError(
+                f"{users[-1]} imports {name}, which is missing or a circle"
+            )
+        if name not in bundles:
+            for address in _imports(name, sources[name]):
+                add(_beside(name, address), bundle, (*users, name))
+            bundles[name] = bundle
+
+    for bundle in starts:
+        for part, owner in FIRST_PARTS.items():
+            if owner == bundle:
+                add(part, bundle, ())
+        add(bundle, bundle, ())
+    for name in sources:
+        add(name, PARTS, ())
+    texts = {}
+    before = ""
+    for bundle in (*starts, PARTS):
+        within = {
+            one: sources[one] for one, owner in bundles.items() if owner == bundle
+        }
+        texts[bundle], texts[bundle + ".map"] = _bundle(bundle, within, before)
+        before = bundle
+    for name, bundle in bundles.items():
+        if name != bundle:
+            texts[name] = _import(bundle, name) + _exported(name, sources[name])
+    return texts
+
+
+def _bundle(bundle: str, sources: Mapping[str, str], before: str) -> tuple[str, str]:
+    """Return the text of a bundle with some modules, and its source map.
+
+    Args:
+        bundle: Its name.
+        sources: The modules, in the order in which they run.
+        before: The bundle before, which has the object of the exports; "" for none.
+
+    """
+    text = _import(before, bundle) if before else "const $modules = {};\n"
+    sections = []
+    for name, source in sources.items():
+        text += f'$modules["{name}"] ??= (() => {{\n'
+        # Each line is that line of the source: the same column, the next line.
+        origin = {
+            "version": 3,
+            "sources": [_address(name, bundle)],
+            "sourcesContent": [source],
+            "names": [],
+            "mappings": "AAAA" + ";AACA" * source.count("\n"),
+        }
+        offset = {"line": text.count("\n"), "column": 0}
+        sections.append({"offset": offset, "map": origin})
+        text += _statements(name, source) + "})();\n"
+    text += "export { $modules };\n"
+    if bundle in sources:
+        text += _exported(bundle, sources[bundle])
+    text += f"//# sourceMappingURL={posixpath.basename(bundle)}.map\n"
+    return text, json.dumps({"version": 3, "sections": sections})
+
+
+def _imports(name: str, source: str) -> list[str]:
+    """Return the addresses that a module imports."""
+    addresses = [address for _, address in _IMPORT.findall(source)]
+    if len(addresses) + len(_EXPORT.findall(source)) != len(_OTHER.findall(source)):
+        raise ValueError(f"{name} has an import or export of another form")
+    return addresses
+
+
+def _statements(name: str, source: str) -> str:
+    """Return the body of the function that returns the exports of a module."""
+
+    def imported(found: re.Match[str]) -> str:
+        names = found[1].replace(" as ", ": ")
+        return f'const {names} = $modules["{_beside(name, found[2])}"];'
+
+    text = without_comments(_EXPORT.sub("", _IMPORT.sub(imported, source)))
+    exports = _EXPORT.findall(source)
+    pairs = [f"default: {local}" if default else local for default, local in exports]
+    return f"{text}\nreturn {{ {', '.join(pairs)} }};\n"
+
+
+def _exported(name: str, source: str) -> str:
+    """Return the statements that export what is exported by a module of a bundle."""
+    exports = _EXPORT.findall(source)
+    names = ", ".join(local for default, local in exports if not default)
+    text = f'export const {{ {names} }} = $modules["{name}"];\n' if names else ""
+    if any(default for default, _ in exports):
+        text += f'export default $modules["{name}"].default;\n'
+    return text
+
+
+def _import(bundle: str, name: str) -> str:
+    return f'import {{ $modules }} from "{_address(bundle, name)}";\n'
+
+
+def served_sheets(
+    sources: Mapping[str, str], shared: str = SHARED_SHEET
+) -> dict[str, str]:
+    """Return each style sheet with the sheets that it imports in place of the imports.
+
+    :data:`PART_SHEETS` is among them.
+
+    Args:
+        sources: The text of each sheet by name, such as ``"web/webmap.css"``.
+        shared: A sheet that many others import; this import stays, and a browser loads
+            the sheet once.
+
+    Raises:
+        ValueError: If an import has another form, or comes after rules.
+        KeyError: If an import names no sheet.
+
+    """
+    mark = "\0"  # where the shared sheet is imported
+
+    def rules(name: str) -> str:
+        """Return the rules of a sheet and of those that it imports."""
+        found = _SHEET.fullmatch(without_comments(sources[name]).lstrip())
+        if found is None or "@import" in found[2]:
+            raise ValueError(f"{name} has an import of another form or after rules")
+        needed = [_beside(name, one) for one in re.findall('"(.+)"', found[1])]
+        return "".join(mark if n == shared else rules(n) for n in needed) + found[2]
+
+    texts = {name: rules(name) for name in sources}
+    texts[PART_SHEETS] = "".join(
+        text
+        for name, text in texts.items()
+        if name.startswith(_SHEET_FOLDERS)
+        and name.removesuffix(".css") + ".js" not in FIRST_PARTS
+    )
+    for name, text in texts.items():
+        if mark in text:
+            address = _address(shared, name)
+            texts[name] = f'@import url("{address}");\n' + text.replace(mark, "")
+    return texts
+
+
+def without_comments(text: str) -> str:
+    """Return a text without comments on lines of their own, which stay empty."""
+    return _COMMENT.sub(lambda found: "\n" * found[0].count("\n"), text)
+
+
+def _beside(name: str, address: str) -> str:
+    """Return the name of what a module or sheet imports from a relative address."""
+    return posixpath.normpath(posixpath.join(posixpath.dirname(name), address))
+
+
+def _address(of: str, seen_from: str) -> str:
+    """Return the relative address of a file, as another file imports it."""
+    address = posixpath.relpath("/" + of, "/" + posixpath.dirname(seen_from))
+    return address if address.startswith(".") else "./" + address
