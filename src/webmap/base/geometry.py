@@ -4,7 +4,8 @@ Lengths are metres and angles radians unless a name shows another unit (REP 103)
 """
 
 import math
-from dataclasses import dataclass
+
+import msgspec
 
 FARTHEST = 1e7
 """Metres: a number beyond the size of a planet is an error that no browser can draw.
@@ -14,8 +15,7 @@ the whole view then fits nothing.
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Vector3:
+class Vector3(msgspec.Struct, frozen=True, gc=False):
     """Three numbers along x, y and z, as in ``geometry_msgs/Vector3`` and ``Point``."""
 
     x: float = 0.0
@@ -33,8 +33,7 @@ def normalize_angle(angle: float) -> float:
     return math.remainder(angle, math.tau)
 
 
-@dataclass(frozen=True, slots=True)
-class Quaternion:
+class Quaternion(msgspec.Struct, frozen=True, gc=False):
     """An orientation, with the component names of ``geometry_msgs/Quaternion``."""
 
     x: float = 0.0
@@ -64,8 +63,7 @@ class Quaternion:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Twist:
+class Twist(msgspec.Struct, frozen=True, gc=False):
     """The velocity of a robot's base in its own frame.
 
     The first three numbers move it in the plane. The others are 0 for every base that
@@ -123,8 +121,7 @@ class Twist:
         }
 
 
-@dataclass(frozen=True, slots=True)
-class Pose:
+class Pose(msgspec.Struct, frozen=True, gc=False):
     """A position and a heading in the plane of a frame that the context defines."""
 
     x: float = 0.0
@@ -156,8 +153,7 @@ class Pose:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Affine:
+class Affine(msgspec.Struct, frozen=True, gc=False):
     """An affine transform of the plane, with the component names of ``SVGMatrix``.
 
     A point ``(x, y)`` becomes ``(a*x + c*y + e, b*x + d*y + f)``.

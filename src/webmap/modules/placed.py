@@ -3,7 +3,6 @@
 import logging
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from webmap.base.errors import ConfigError
@@ -188,7 +187,7 @@ class Placed:
         else:
             pose, tilt = found.offset.heading_and_tilt
             lift = Vector3(0.0, 0.0, tilt.translation.z - found.ground)
-            self._tilt(self._draw, replace(tilt, translation=lift))
+            self._tilt(self._draw, Transform(lift, tilt.rotation))
             offset = Affine.of_pose(pose)
         # Only now, since drawing may fail: the earlier drawing then stays in place.
         self._offset, self._on_robot = offset, found.on_robot

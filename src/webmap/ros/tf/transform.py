@@ -1,7 +1,8 @@
 """The transform between two frames, in space, and its errors."""
 
 import math
-from dataclasses import dataclass
+
+import msgspec
 
 from webmap.base.errors import WebMapError
 from webmap.base.geometry import FARTHEST, Affine, Pose, Quaternion, Vector3
@@ -35,8 +36,7 @@ class NotKnownThen(TransformError):
     """Both frames are connected, but a transform between is not known at that time."""
 
 
-@dataclass(frozen=True, slots=True)
-class Transform:
+class Transform(msgspec.Struct, frozen=True, gc=False):
     """A transform from coordinates of one frame to those of another: turns, then moves.
 
     Its name shows the frames: ``map_from_base`` transforms coordinates of the base to
