@@ -173,6 +173,15 @@ class Affine(msgspec.Struct, frozen=True, gc=False):
         return cls(cos, sin, -sin, cos, pose.x, pose.y)
 
     @classmethod
+    def into_pose(cls, pose: "Pose") -> "Affine":
+        """Return the transform from the outer frame to the frame that has this pose."""
+        cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
+        det = cos * cos + sin * sin
+        a, b = cos / det, sin / det
+        x, y = pose.x, pose.y
+        return cls(a, -b, b, a, -(a * x + b * y), -(-b * x + a * y))
+
+    @classmethod
     def translation(cls, x: float, y: float) -> "Affine":
         """Return the transform that moves every point by ``(x, y)``."""
         return cls(e=x, f=y)
