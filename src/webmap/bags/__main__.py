@@ -14,8 +14,8 @@ from webmap.base.errors import ConfigError, WebMapError
 from webmap.base.logs import set_up_logging
 from webmap.base.not_listening import why_not_listening
 from webmap.base.outside_text import one_line
+from webmap.ros.rosbridge.server.dialect import POLITE
 from webmap.ros.rosbridge.server.encode import Encoder
-from webmap.ros.rosbridge.server.quirks import POLITE
 from webmap.ros.rosbridge.server.server import RosbridgeServer
 from webmap.sim.process import signals_set
 

@@ -8,6 +8,7 @@ from typing import Any
 from webmap.bags.recording import FRAMES, AllFrames, Recorded, Recording, is_static
 from webmap.bags.status import MARKS, STATUS, TYPE, Marks, Status, text_of
 from webmap.bags.times import Pace, Stamps
+from webmap.ros.rosbridge.server.dialect import POLITE
 from webmap.ros.rosbridge.server.graph import (
     BRIDGE_NODE,
     Deliver,
@@ -15,7 +16,6 @@ from webmap.ros.rosbridge.server.graph import (
     GraphError,
     ServiceHandler,
 )
-from webmap.ros.rosbridge.server.quirks import POLITE
 from webmap.ros.rosbridge.server.rosapi import Rosapi
 from webmap.ros.rosbridge.server.schema import Schema
 

@@ -15,7 +15,7 @@ from webmap.discovery import discover
 from webmap.gate.display.client import GateClient
 from webmap.gate.protocol import RobotReport, RobotSpec
 from webmap.ros.bridge import TemporaryBridge
-from webmap.ros.rosbridge.server.quirks import REAL, dialect_of
+from webmap.ros.rosbridge.server.dialect import REAL, dialect_of
 
 pytestmark = pytest.mark.slow
 

@@ -8,6 +8,6 @@ are in ``webmap.ros.rosbridge``.
 from webmap.discovery.doctor.configured import ConfiguredRobot
 from webmap.discovery.doctor.observed import Measurement, Observed
 from webmap.discovery.doctor.verdict import is_ready, judge
-from webmap.ros.finding import Finding
+from webmap.ros.rosbridge.advice import Finding
 
 __all__ = ["ConfiguredRobot", "Finding", "Measurement", "Observed", "is_ready", "judge"]

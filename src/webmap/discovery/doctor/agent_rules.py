@@ -4,9 +4,8 @@ from collections.abc import Iterator
 from urllib.parse import urlsplit
 
 from webmap.discovery.doctor.observed import Observed
-from webmap.ros.finding import BRIDGE, Finding
 from webmap.ros.names import agent_named
-from webmap.ros.rosbridge.advice import listen_advice
+from webmap.ros.rosbridge.advice import BRIDGE, Finding, listen_advice
 from webmap.ros.rosbridge.checks import is_loopback
 
 ON_THE_ROBOT = (

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 from webmap.discovery.doctor import agent_rules
 from webmap.discovery.doctor.observed import MOST_ROBOTS, Clock, Observed
-from webmap.ros.finding import BRIDGE, Finding
 from webmap.ros.names import is_agent_url
 from webmap.ros.rosbridge import advice
+from webmap.ros.rosbridge.advice import BRIDGE, Finding
 
 SLOW_LOOP = 0.15
 """Seconds of a round trip from which WebMap limits the speed."""

@@ -2,7 +2,7 @@
 
 from webmap.discovery.doctor.observed import Measurement, Observed
 from webmap.discovery.found import Guess
-from webmap.ros.finding import Finding, Level
+from webmap.ros.rosbridge.advice import Finding, Level
 
 OLD = 1.0
 """Seconds after which a pose is too old for driving."""

@@ -7,8 +7,8 @@ from webmap.base.counted import counted
 from webmap.discovery.doctor.observed import Measurement, Observed
 from webmap.discovery.doctor.rate_rules import age_of, silence
 from webmap.discovery.found import FoundRobot, Role
-from webmap.ros.finding import Finding, Level
 from webmap.ros.rosbridge import advice
+from webmap.ros.rosbridge.advice import Finding, Level
 
 PICTURE_AGE = 1.0
 """Seconds after which a picture is too old for driving."""

@@ -7,7 +7,7 @@ from webmap.base.outside_text import one_line
 from webmap.discovery.doctor.bridge_rules import bridge_findings
 from webmap.discovery.doctor.observed import Observed
 from webmap.discovery.doctor.robot_rules import robot_findings
-from webmap.ros.finding import LEVELS, Finding, Level
+from webmap.ros.rosbridge.advice import LEVELS, Finding, Level
 
 MARKS = {"wrong": "WRONG", "warning": "warning", "note": "note", "good": "good"}
 

@@ -10,7 +10,7 @@ from webmap.base.scope import Removal, keep
 from webmap.core.problems import refusing
 from webmap.core.registry import robot_modules
 from webmap.ros.bridge import Bridge
-from webmap.ros.messages_log import LEVELS, LogMsg
+from webmap.ros.messages import LOG_LEVELS, LogMsg
 from webmap.scene import html
 from webmap.scene.element import Element
 
@@ -69,8 +69,8 @@ class Rosout:
         prefix: str = "",
         lines: int = 100,
     ) -> None:
-        if level not in LEVELS:
-            raise ConfigError(f"level is one of {', '.join(LEVELS)}, got {level!r}")
+        if level not in LOG_LEVELS:
+            raise ConfigError(f"level is one of {', '.join(LOG_LEVELS)}, got {level!r}")
         if lines < 1:
             raise ConfigError(f"lines must be at least 1, got {lines}")
         self.robot = robot
@@ -100,7 +100,7 @@ class Rosout:
     def on_log(self, message: LogMsg) -> None:
         """Keep a line, if it passes the filters."""
         level, name = message.level_name, message.name
-        if LEVELS.index(level) < LEVELS.index(self.level):
+        if LOG_LEVELS.index(level) < LOG_LEVELS.index(self.level):
             return
         if not name.lstrip("/").startswith(self.prefix):
             return

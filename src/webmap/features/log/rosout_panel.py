@@ -13,7 +13,7 @@ from webmap.base.errors import ConfigError
 from webmap.base.scope import Removable, Removal, keep, no_scope
 from webmap.core.registry import map_modules
 from webmap.ros.bridge import Bridge
-from webmap.ros.messages_log import LEVELS, LogMsg
+from webmap.ros.messages import LOG_LEVELS, LogMsg
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
@@ -150,8 +150,8 @@ class RosoutPanel:
         level: str = "info",
         lines: int = 100,
     ) -> None:
-        if level not in LEVELS:
-            raise ConfigError(f"level is one of {', '.join(LEVELS)}, got {level!r}")
+        if level not in LOG_LEVELS:
+            raise ConfigError(f"level is one of {', '.join(LOG_LEVELS)}, got {level!r}")
         if not 1 <= lines <= 200:
             raise ConfigError(f"lines must be 1 to 200, got {lines}")
         self.map = map
@@ -163,7 +163,7 @@ class RosoutPanel:
         self.browser_part = map.add_browser_part(
             self,
             "features/log/rosout_panel.js",
-            {"level": level, "levels": list(LEVELS), "lines": lines},
+            {"level": level, "levels": list(LOG_LEVELS), "lines": lines},
             "features/log/rosout_panel.css",
         )
         keep(Removal(self._close))

@@ -10,9 +10,9 @@ import msgspec
 
 from webmap.base.errors import ProtocolError
 from webmap.ros.decoding import check_depth, convert, decode_json
+from webmap.ros.limits import check_count
 from webmap.ros.received import ReceivedMessage
 from webmap.ros.rosbridge import cbor
-from webmap.ros.rosbridge.frame_limits import check_count
 
 
 class Publish(ReceivedMessage):

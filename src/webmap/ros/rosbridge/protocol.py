@@ -17,7 +17,7 @@ import msgspec
 
 from webmap.base.errors import ProtocolError
 from webmap.ros.decoding import check_depth, convert, decode_json
-from webmap.ros.limits import LARGE, MAX_FRAME, MIB
+from webmap.ros.limits import LARGE, MAX_FRAME, MAX_NUMBERS, MAX_OTHER, MIB, check_count
 from webmap.ros.rosbridge import cbor
 from webmap.ros.rosbridge.events import (
     CallService,
@@ -28,7 +28,6 @@ from webmap.ros.rosbridge.events import (
     Status,
     Unknown,
 )
-from webmap.ros.rosbridge.frame_limits import MAX_NUMBERS, MAX_OTHER, check_count
 from webmap.ros.rosbridge.incoming import SHORTENED
 
 
