@@ -10,8 +10,8 @@ from webmap.base.geometry import Affine, Pose, Vector3
 from webmap.base.looking import looking
 from webmap.base.scope import Removal, keep
 from webmap.modules.sighting import Sighting, Sightings
-from webmap.poses.frames import lasting
-from webmap.poses.lasting import Lasting
+from webmap.poses.frames import delayed_problem
+from webmap.poses.placing import ProblemDelay
 from webmap.ros.tf import Transform
 from webmap.ros.tf.transform import alike
 from webmap.scene import svg
@@ -96,7 +96,7 @@ class Placed:
         self._settled = True
         self._upright: dict[Element, tuple[float, float]] = {}
         self._trouble = ""
-        self._lasting = Lasting()
+        self._problem_delay = ProblemDelay()
         self.svg = svg.g(*children, class_=class_, pointer_events="none")
         if frame == "map":
             robot.svg.insert(robot.svg.children.index(robot.model), self.svg)
@@ -224,7 +224,9 @@ class Placed:
 
     def _show_trouble(self, found: Sighting) -> None:
         """Show a problem of the pose once; clear it when it ends."""
-        trouble = lasting(self._lasting, found.trouble, self.robot.pose_source.frames)
+        trouble = delayed_problem(
+            self._problem_delay, found.trouble, self.robot.pose_source.frames
+        )
         if trouble == self._trouble:
             return
         self._trouble = trouble

@@ -10,16 +10,16 @@ from webmap.base.geometry import FARTHEST
 from webmap.base.looking import RARELY
 from webmap.base.scope import Removable, Scope, no_scope
 from webmap.base.tasks import spawn
-from webmap.poses.placing import PoseReading
-from webmap.ros.bridge import Bridge
-from webmap.ros.decoding import convert
-from webmap.ros.subscriptions import Subscription, SubscriptionOptions
-from webmap.ros.views import (
+from webmap.poses.placing import (
     ODOMETRY_VIEWS,
     OdometryView,
+    PoseReading,
     odometry_view,
     odometry_view_by_shape,
 )
+from webmap.ros.bridge import Bridge
+from webmap.ros.decoding import convert
+from webmap.ros.subscriptions import Subscription, SubscriptionOptions
 
 ODOMETRY = "nav_msgs/Odometry"
 """The pose type that also has a velocity."""
