@@ -19,7 +19,7 @@ from webmap.fleet.agent import (
     parse_operators,
     parse_rates,
 )
-from webmap.ros.asking import ask_topics
+from webmap.ros.temporary_bridge import ask_topics
 from webmap_process import simulator, webmap
 
 pytest.importorskip("zenoh")

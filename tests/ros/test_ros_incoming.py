@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 
 from webmap.base.errors import ProtocolError
 from webmap.ros.limits import MAX_FRAME
-from webmap.ros.rosbridge.incoming import (
+from webmap.ros.rosbridge.frame_reader import (
     KEPT,
     MOST_FRAGMENTS,
     PIECE,
     SHORTENED,
-    Incoming,
+    FrameReader,
 )
 
 
@@ -31,7 +31,7 @@ class Reader:
 
     def __init__(self, shaken=True):
         self.messages, self.others = [], b""
-        self.incoming = Incoming(self.other)
+        self.incoming = FrameReader(self.other)
         self.incoming.message = self.messages.append
         self.incoming.shaken = shaken
         self.steps = 0
@@ -154,7 +154,7 @@ def test_during_the_handshake_each_line_is_a_step():
 
 
 def test_bytes_that_wait_are_not_copied_again_for_each_that_comes():
-    incoming = Incoming(bytes)
+    incoming = FrameReader(bytes)
     incoming.shaken = True
     incoming.feed(bytes(1 << 20))
     incoming.feed(b"x")

@@ -25,7 +25,7 @@ from webmap.ros.limits import (
 )
 from webmap.ros.messages import TFMessage
 from webmap.ros.rosbridge.events import Malformed, Publish
-from webmap.ros.rosbridge.incoming import SHORTENED
+from webmap.ros.rosbridge.frame_reader import SHORTENED
 from webmap.ros.rosbridge.protocol import Protocol
 
 MIB = 1 << 20

@@ -11,7 +11,7 @@ from webmap.bags.status import MARKS, STATUS
 from webmap.base.errors import BridgeError, ConfigError
 from webmap.ros.bridge import Bridge
 from webmap.ros.names import is_type, normalise_topic
-from webmap.ros.received import ReceivedMessage
+from webmap.ros.received_message import ReceivedMessage
 
 LOOK = 2.0
 """Seconds between two checks for new topics."""

@@ -15,10 +15,10 @@ from webmap.bags.types import Types
 from webmap.base.counted import counted
 from webmap.base.echo import echo
 from webmap.base.errors import BridgeError, ConfigError, ServiceError
-from webmap.ros.asking import ask_topics
 from webmap.ros.bridge import Bridge
 from webmap.ros.names import split_type
 from webmap.ros.rosbridge.server.dialect import DialectName
+from webmap.ros.temporary_bridge import ask_topics
 from webmap.sim.process import signals_set
 
 EVERY = 10.0

@@ -11,8 +11,8 @@ from typing import Any
 from webmap.bags.bag_file import BagFile
 from webmap.bags.types import Types, TypeVersion
 from webmap.base.errors import ProtocolError
-from webmap.ros.conforming import Misfit
-from webmap.ros.received import ReceivedMessage
+from webmap.ros.message_check import Misfit
+from webmap.ros.received_message import ReceivedMessage
 
 log = logging.getLogger("webmap.bags")
 

@@ -16,7 +16,7 @@ from webmap.base.tasks import begin
 from webmap.core.pictures import Publisher
 from webmap.core.view import initial_view
 from webmap.gate.protocol import Role
-from webmap.scene.bound import BoundElement, Document
+from webmap.scene.document import BoundElement, Document
 from webmap.scene.element import Element, Event, Handler, Listener
 from webmap.scene.node import Fragment
 from webmap.scene.wire.session import SceneSession

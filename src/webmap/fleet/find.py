@@ -11,8 +11,8 @@ from webmap.discovery import Findings, discover
 from webmap.discovery.frame_listening import receive_frames
 from webmap.discovery.naming import free_name, unique_names
 from webmap.discovery.robots import host_name
-from webmap.ros.asking import ask_topics
 from webmap.ros.names import agent_named
+from webmap.ros.temporary_bridge import ask_topics
 
 LIST_ROBOTS = (
     "List each robot with --robot NAME:ODOM:CMD_VEL:SCAN, "

@@ -3,7 +3,7 @@
 from webmap.base.errors import ProtocolError
 from webmap.discovery.tf_robots import MAP
 from webmap.ros.messages import TFMessage
-from webmap.ros.received import ReceivedMessage
+from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.tf import Buffer, Transform, TransformError
 
 

@@ -14,7 +14,7 @@ from webmap.discovery.doctor.frames import FrameListening
 from webmap.discovery.doctor.observed import Measurement
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import Header
-from webmap.ros.received import ReceivedMessage
+from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.subscriptions import Encoding
 
 ENOUGH = 4

@@ -14,8 +14,8 @@ from webmap.core.page import page_of
 from webmap.core.registry import robot_modules
 from webmap.features.buttons.robot_button import RobotButton, declared_motion, values_of
 from webmap.ros.bridge import Bridge
-from webmap.ros.conforming import Misfit
 from webmap.ros.definitions import FLOATS, INTEGERS, TIMES, Field, UnknownType
+from webmap.ros.message_check import Misfit
 from webmap.ros.message_forms import entry_of, filled_in, hint, initial, leaves
 from webmap.scene import html
 from webmap.scene.element import Element, Event

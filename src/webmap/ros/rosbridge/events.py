@@ -11,7 +11,7 @@ import msgspec
 from webmap.base.errors import ProtocolError
 from webmap.ros.decoding import check_depth, convert, decode_json
 from webmap.ros.limits import check_count
-from webmap.ros.received import ReceivedMessage
+from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.rosbridge import cbor
 
 

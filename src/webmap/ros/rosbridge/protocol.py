@@ -28,7 +28,7 @@ from webmap.ros.rosbridge.events import (
     Status,
     Unknown,
 )
-from webmap.ros.rosbridge.incoming import SHORTENED
+from webmap.ros.rosbridge.frame_reader import SHORTENED
 
 
 def decode_png(data: str, *, max_bytes: int = MAX_OTHER) -> bytes:
