@@ -15,16 +15,19 @@ from webmap.ros import limits, worker
 from webmap.ros.limits import (
     GENERAL,
     LIMITS,
-    MAX_ITEMS,
-    MAX_NUMBERS,
-    MAX_OTHER,
     MAX_VALUES,
     TooLarge,
-    check_count,
     limit_of,
 )
 from webmap.ros.messages import TFMessage
-from webmap.ros.rosbridge.events import Malformed, Publish
+from webmap.ros.rosbridge.events import (
+    MAX_ITEMS,
+    MAX_NUMBERS,
+    MAX_OTHER,
+    Malformed,
+    Publish,
+    check_count,
+)
 from webmap.ros.rosbridge.frame_reader import SHORTENED
 from webmap.ros.rosbridge.protocol import Protocol
 

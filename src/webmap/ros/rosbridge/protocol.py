@@ -17,9 +17,11 @@ import msgspec
 
 from webmap.base.errors import ProtocolError
 from webmap.ros.decoding import check_depth, convert, decode_json
-from webmap.ros.limits import LARGE, MAX_FRAME, MAX_NUMBERS, MAX_OTHER, MIB, check_count
+from webmap.ros.limits import LARGE, MAX_FRAME, MIB
 from webmap.ros.rosbridge import cbor
 from webmap.ros.rosbridge.events import (
+    MAX_NUMBERS,
+    MAX_OTHER,
     CallService,
     Event,
     Malformed,
@@ -27,6 +29,7 @@ from webmap.ros.rosbridge.events import (
     ServiceResponse,
     Status,
     Unknown,
+    check_count,
 )
 from webmap.ros.rosbridge.frame_reader import SHORTENED
 
