@@ -10,7 +10,7 @@ from test_layers_markers import CUBE, TEXT, marker
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Affine
-from webmap.features.layers.markers import layer as markers
+from webmap.features.layers import markers
 from webmap.poses.alignment import align_bridge
 from webmap.poses.frames import _shared_frames
 

@@ -18,7 +18,7 @@ from webmap.base.errors import ConfigError, ProtocolError
 from webmap.core.layer import Layer
 from webmap.features.layers.diagnostics import DiagnosticArrayMsg
 from webmap.features.layers.grid_cells import GridCellsMsg
-from webmap.features.layers.markers.messages import MarkerArrayMsg
+from webmap.features.layers.marker_drawing import MarkerArrayMsg
 from webmap.features.layers.nav_sat_fix import NavSatFixMsg
 from webmap.features.layers.occupancy_grid import OccupancyGridUpdateMsg
 from webmap.features.layers.point_cloud import PointCloud2Msg
