@@ -12,7 +12,7 @@ from typing import Any
 
 from webmap.console.card_parts import GOALS
 from webmap.core.robot_state import SEEN, STATE_TEXTS
-from webmap.features.goals.goal_tool import SPACING
+from webmap.features.goals.goals import SPACING
 from webmap.features.routes.route_tool import LONGEST_NAME, MOST_POINTS
 from webmap.gate.protocol import MAY_MOVE
 from webmap.ros.messages_log import LEVELS

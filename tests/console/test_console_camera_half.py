@@ -6,7 +6,7 @@ import pytest
 
 from webmap import Map, Robot
 from webmap.core.page import Page, PageEntry, Viewer
-from webmap.features.cameras.camera_feed import CameraFeed
+from webmap.features.cameras.camera import CameraFeed
 from webmap.features.cameras.camera_panel import (
     CameraPanel,
     CameraViews,

@@ -6,7 +6,7 @@ import pytest
 
 from webmap import Map, Robot
 from webmap.core.page import Page, PageEntry, Viewer
-from webmap.features.goals.goal_tool import GoalTool
+from webmap.features.goals.goals import GoalTool
 from webmap.features.stop.stop_button import StopButton
 from webmap.features.view.view import Follow, PointerReadout, ScaleBar
 from webmap.scene.wire.session import SceneSession

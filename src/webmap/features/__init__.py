@@ -11,11 +11,15 @@ has one Python, one JavaScript and one CSS file.
 
 FILES = {
     "Follow": "view.view",
+    "GoalTool": "goals.goals",
+    "HttpCamera": "cameras.camera",
+    "InitialPoseTool": "goals.goals",
     "LayerSwitches": "view.view",
     "MapViewControl": "view.view",
     "MetreGrid": "view.view",
     "MouseViewControl": "view.view",
     "PointerReadout": "view.view",
+    "RosoutPanel": "log.rosout",
     "ScaleBar": "view.view",
     "ShowSelected": "view.view",
 }

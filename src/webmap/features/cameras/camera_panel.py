@@ -7,7 +7,7 @@ import weakref
 from typing import TYPE_CHECKING, Any
 
 from webmap import html
-from webmap.features.cameras.camera_feed import AGE_LIMIT
+from webmap.features.cameras.camera import AGE_LIMIT
 
 if TYPE_CHECKING:
     from webmap import Element, Map, Robot
