@@ -8,8 +8,7 @@ from module_fakes import Channel, Someone
 import webmap
 from webmap import Map
 from webmap.core.page import Page, PageEntry
-from webmap.features.alerts.alert_panel import AlertPanel
-from webmap.features.alerts.alerts import MOST, Alerts
+from webmap.features.alerts.alerts import MOST, AlertPanel, Alerts
 
 PACKAGE = Path(webmap.__file__).parent
 
