@@ -13,8 +13,14 @@ from PIL import Image
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Affine
 from webmap.base.local_plane import LocalPlane
-from webmap.features.tiles.tile_grid import Tile, TileGrid
-from webmap.features.tiles.tile_source import FolderTiles, MBTiles, open_tiles, plain
+from webmap.features.tiles.tile_layer import TileGrid
+from webmap.features.tiles.tile_source import (
+    FolderTiles,
+    MBTiles,
+    Tile,
+    open_tiles,
+    plain,
+)
 
 PLACES = [(50.0, 14.0), (0.0, 179.9999), (-33.9, 18.4), (67.0, -150.0)]
 
