@@ -152,11 +152,11 @@ CameraType: TypeAlias = Literal[
 
 PACKED, RAW = "sensor_msgs/CompressedImage", "sensor_msgs/Image"
 
-DRAWN = "jpeg"
+JPEG = "jpeg"
 """The encoding of a large raw picture after the worker process has drawn it."""
 
 
-class ShownImageMsg(ImageMsg):
+class JpegImageMsg(ImageMsg):
     """A raw picture that is converted to JPEG if it is large."""
 
     def digest(self) -> ImageMsg:
@@ -165,10 +165,10 @@ class ShownImageMsg(ImageMsg):
         Raises:
             ProtocolError: If its encoding or its size is not supported.
         """
-        return msgspec.structs.replace(self, encoding=DRAWN, data=jpeg(self))
+        return msgspec.structs.replace(self, encoding=JPEG, data=jpeg(self))
 
 
-class ShownAnyImageMsg(AnyImageMsg):
+class JpegAnyImageMsg(AnyImageMsg):
     """A picture of either type; a large raw picture is converted to JPEG."""
 
     def digest(self) -> AnyImageMsg:
@@ -179,13 +179,13 @@ class ShownAnyImageMsg(AnyImageMsg):
         """
         if self.raw is None:
             return self
-        return msgspec.structs.replace(self, encoding=DRAWN, data=jpeg(self.raw))
+        return msgspec.structs.replace(self, encoding=JPEG, data=jpeg(self.raw))
 
 
 VIEWS: dict[str | None, type[msgspec.Struct]] = {
     PACKED: CompressedImageMsg,
-    RAW: ShownImageMsg,
-    None: ShownAnyImageMsg,
+    RAW: JpegImageMsg,
+    None: JpegAnyImageMsg,
 }
 
 PLAIN = re.compile(r"/image(?![^/]*(?:compress|jpe?g|png|webp))[^/]*\Z")
@@ -234,7 +234,7 @@ class Camera(CameraFeed):
         self._throttle = throttle
         self._scope: Scope | None = None
         self._drawing: asyncio.Task[None] | None = None
-        self._undrawn: ImageMsg | None = None
+        self._waiting: ImageMsg | None = None
 
     def begin(self) -> None:
         """Subscribe to the pictures."""
@@ -256,7 +256,7 @@ class Camera(CameraFeed):
         scope, self._scope = self._scope, None
         if scope is not None:
             scope.close()
-        self._undrawn = None
+        self._waiting = None
 
     def _report(self, text: str, about: object) -> None:
         if about is None:
@@ -291,17 +291,17 @@ class Camera(CameraFeed):
         Raises:
             ProtocolError: If its encoding or its size is not supported.
         """
-        if image.encoding == DRAWN:
+        if image.encoding == JPEG:
             self.show(image.data, "image/jpeg", self._bridge.lag)
             return
-        self._undrawn = image
+        self._waiting = image
         if self._drawing is None:
             self._drawing = spawn(self._draw())
 
     async def _draw(self) -> None:
         try:
-            while (image := self._undrawn) is not None:
-                self._undrawn = None
+            while (image := self._waiting) is not None:
+                self._waiting = None
                 try:
                     data = await asyncio.to_thread(jpeg, image)
                 except ProtocolError as error:

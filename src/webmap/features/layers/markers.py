@@ -191,7 +191,7 @@ class Markers(MapLayer):
         """Prepare the layer; there are no markers yet."""
         self.shapes: dict[Key, Element] = {}
         """The drawn markers, by namespace and number."""
-        self._looks: dict[Key, tuple[object, ...]] = {}
+        self._appearances: dict[Key, tuple[object, ...]] = {}
         self._ends: dict[Key, float] = {}
         self._timer: asyncio.TimerHandle | None = None
         self._left_out: set[Key] = set()
@@ -313,12 +313,12 @@ class Markers(MapLayer):
 
     def _show(self, key: Key, marker: MarkerMsg, frame: Transform) -> None:
         """Place a marker, and draw it again if it looks different from above."""
-        before, look = self.shapes.get(key), look_of(marker, frame)
-        if before is not None and self._looks[key] == look:
+        before, look = self.shapes.get(key), appearance(marker, frame)
+        if before is not None and self._appearances[key] == look:
             place(before, marker, frame)
         else:
             self._draw(key, before, shape_of(marker, frame), marker)
-            self._looks[key] = look
+            self._appearances[key] = look
 
     def _draw(
         self, key: Key, before: Element | None, shape: Element, marker: MarkerMsg
@@ -334,7 +334,7 @@ class Markers(MapLayer):
 
     def _drop(self, key: Key) -> None:
         shape = self.shapes.pop(key, None)
-        self._looks.pop(key, None)
+        self._appearances.pop(key, None)
         self._ends.pop(key, None)
         self.frames.forget(key)
         if shape is not None:
@@ -372,14 +372,14 @@ def _wrong(marker: MarkerMsg, error: WebMapError) -> str:
 MAX_POINTS = 20_000
 """Greatest number of points of one marker."""
 
-SEEN = 3
+DECIMALS = 3
 """Decimals of a rotation that decide whether a tilting marker is drawn again."""
 
-AS_IT_COMES = Transform()
+IDENTITY = Transform()
 """The identity: draws a marker with its own coordinates."""
 
 
-def shape_of(marker: MarkerMsg, frame: Transform = AS_IT_COMES) -> Element:
+def shape_of(marker: MarkerMsg, frame: Transform = IDENTITY) -> Element:
     """Return a marker as a group at its pose, seen from above.
 
     Args:
@@ -406,7 +406,7 @@ def shape_of(marker: MarkerMsg, frame: Transform = AS_IT_COMES) -> Element:
     return group
 
 
-def look_of(marker: MarkerMsg, frame: Transform = AS_IT_COMES) -> tuple[object, ...]:
+def appearance(marker: MarkerMsg, frame: Transform = IDENTITY) -> tuple[object, ...]:
     """Return all values that a marker's shape depends on, except its position.
 
     Args:
@@ -419,11 +419,11 @@ def look_of(marker: MarkerMsg, frame: Transform = AS_IT_COMES) -> tuple[object, 
     m = marker
     q = _split(m, frame)[1].rotation
     sign = math.copysign(1.0, q.w)  # both signs are the same rotation
-    tilt = (round(sign * part, SEEN) + 0.0 for part in (q.x, q.y, q.z, q.w))
+    tilt = (round(sign * part, DECIMALS) + 0.0 for part in (q.x, q.y, q.z, q.w))
     return (m.type, m.scale, m.color, m.points, m.colors, m.text, *tilt)
 
 
-def place(shape: Element, marker: MarkerMsg, frame: Transform = AS_IT_COMES) -> None:
+def place(shape: Element, marker: MarkerMsg, frame: Transform = IDENTITY) -> None:
     """Place an already drawn shape at its marker's pose.
 
     Args:

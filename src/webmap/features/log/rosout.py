@@ -27,7 +27,7 @@ MAX_TEXT = 2000
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class RobotLogLine:
     """One log message of a node."""
 
     level: str
@@ -81,7 +81,7 @@ class Rosout:
         self.robot = robot
         self.level = level
         self.prefix = prefix.lstrip("/")
-        self.lines: deque[Line] = deque(maxlen=lines)
+        self.lines: deque[RobotLogLine] = deque(maxlen=lines)
         """The lines, the newest last."""
         self._lists: list[Element] = []
         # The type depends on the dialect, and the topic always exists.
@@ -110,7 +110,9 @@ class Rosout:
         if not name.lstrip("/").startswith(self.prefix):
             return
         text = message.msg[:MAX_TEXT]
-        line = Line(level, name[:MAX_TEXT], text, message.stamp, time.monotonic())
+        line = RobotLogLine(
+            level, name[:MAX_TEXT], text, message.stamp, time.monotonic()
+        )
         self.lines.append(line)
         for element in self._lists:
             element.append(_row(line))
@@ -119,7 +121,7 @@ class Rosout:
         self.robot.notify_modules("on_rosout", line)
 
 
-def _row(line: Line) -> Element:
+def _row(line: RobotLogLine) -> Element:
     return html.li(
         html.span(line.name, class_="name"),
         html.span(line.text, class_="message"),
@@ -137,7 +139,7 @@ LONGEST = 500
 
 
 @dataclass(slots=True)
-class LogLine:
+class BridgeLogLine:
     """A log message of a node, once or several times in a row."""
 
     number: int
@@ -164,7 +166,7 @@ class BridgeLog:
     """
 
     def __init__(self, bridge: Bridge) -> None:
-        self.lines: deque[LogLine] = deque(maxlen=MOST)
+        self.lines: deque[BridgeLogLine] = deque(maxlen=MOST)
         """The lines, the newest last."""
         self.total = 0
         """Number of all messages received."""
@@ -202,9 +204,11 @@ class BridgeLog:
             last.received_at, last.version = now, self.version
             return
         number = next(self._numbers)
-        self.lines.append(LogLine(number, level, name, text, 1, now, self.version))
+        self.lines.append(
+            BridgeLogLine(number, level, name, text, 1, now, self.version)
+        )
 
-    def since(self, version: int) -> list[LogLine]:
+    def since(self, version: int) -> list[BridgeLogLine]:
         """Return the lines that changed after a version, the newest last."""
         return [line for line in self.lines if line.version > version]
 

@@ -1,6 +1,6 @@
 import { button as newButton, html, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
-import { clock, grouped, Position } from "./player_position.js";
+import { clock, groupMarks, Position } from "./player_position.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
@@ -295,7 +295,7 @@ class MarkLine {
     this._drawn = drawn;
     const focus = this._buttons.findIndex(({ button }) => button === document.activeElement);
     for (const { button } of this._buttons) button.remove();
-    const groups = grouped(this._marks, this._seconds, APART / width);
+    const groups = groupMarks(this._marks, this._seconds, APART / width);
     this._buttons = groups.map((group, index) => {
       const button = html(
         "button",

@@ -140,7 +140,9 @@ class TileLayer:
 
     async def _look(self) -> None:
         map = self.map
-        wanted = self.grid.wanted(map.world.tf, map.canvas_width, map.canvas_height)
+        wanted = self.grid.tiles_in_view(
+            map.world.tf, map.canvas_width, map.canvas_height
+        )
         for tile in wanted:
             if self._dirty or self._closed:  # the view has changed
                 return
@@ -210,7 +212,7 @@ class TileGrid:
         self.size = size
         self.most = most
 
-    def wanted(self, view: Affine, width: float, height: float) -> list[Tile]:
+    def tiles_in_view(self, view: Affine, width: float, height: float) -> list[Tile]:
         """Return the tiles in a view, the middle of the view first.
 
         The level is the one whose pixels are nearest to the screen's in size, or a
