@@ -12,10 +12,10 @@ from typing import Any
 
 from webmap.console.card_parts import GOALS
 from webmap.core.robot_state import SEEN, STATE_TEXTS
-from webmap.features.goals.goal_tool import SPACING
+from webmap.features.goals.goals import SPACING
 from webmap.features.routes.route_tool import LONGEST_NAME, MOST_POINTS
 from webmap.gate.protocol import MAY_MOVE
-from webmap.ros.messages_log import LEVELS
+from webmap.ros.messages import LOG_LEVELS
 from webmap.scene.wire.messages import LONGEST_TEXTS, MOST_UNSEEN, PAGE_ID
 from webmap.scene.wire.opcodes import TABLES, VERSION
 from webmap.server.access import CODE, KEY, PROTOCOL
@@ -81,7 +81,7 @@ def constants_js() -> str:
         "MOST_POINTS": (MOST_POINTS, "Most points of a route."),
         "LONGEST_NAME": (LONGEST_NAME, "Most characters of a route's name."),
         "SPACING": (list(SPACING), "Metres between robots that are sent together."),
-        "LEVELS": (list(LEVELS), "The levels of a log, the lowest first."),
+        "LEVELS": (list(LOG_LEVELS), "The levels of a log, the lowest first."),
         "MAY_MOVE": (MAY_MOVE, "The alarm about a robot that zero cannot reach."),
         "GOALS": (
             {state: [words, shape] for state, (words, shape, _) in GOALS.items()},

@@ -7,8 +7,8 @@ from contextlib import asynccontextmanager
 from webmap.bags.player import Player
 from webmap.bags.recording import Recording
 from webmap.bags.times import SECOND
+from webmap.ros.rosbridge.server.dialect import POLITE
 from webmap.ros.rosbridge.server.encode import Encoder
-from webmap.ros.rosbridge.server.quirks import POLITE
 from webmap.ros.rosbridge.server.session import Session
 
 NOW = 1_800_000_000 * SECOND

@@ -12,8 +12,8 @@ from equipment.bag_files import BEGIN, Made, types_of
 from webmap.bags.recording import Recording
 from webmap.bags.times import Stamps
 from webmap.bags.types import MessageConverter, texts_of
-from webmap.ros.conforming import Misfit
 from webmap.ros.definitions import Definitions, UnknownType
+from webmap.ros.message_check import Misfit
 from webmap.ros.rosbridge.server.dialect import Dialect
 from webmap.ros.rosbridge.server.schema import Schema
 

@@ -21,7 +21,7 @@ from webmap.fleet.agent import (
     parse_operators,
     parse_rates,
 )
-from webmap.ros.asking import ask_topics
+from webmap.ros.temporary_bridge import ask_topics
 
 pytest.importorskip("zenoh")
 

@@ -11,7 +11,7 @@ from webmap.cli import demo_robots
 from webmap.cli.demo import simulator
 from webmap.cli.demo_robots import FREE, PauseErrands, demo_robot
 from webmap.discovery import discover
-from webmap.ros.asking import ask_topics
+from webmap.ros.temporary_bridge import ask_topics
 
 DIALECTS = pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 

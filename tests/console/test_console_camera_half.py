@@ -7,7 +7,7 @@ import pytest
 from webmap import Map, Robot
 from webmap.core.base_page import PageEntry, Viewer
 from webmap.core.page import Page
-from webmap.features.cameras.camera_feed import CameraFeed
+from webmap.features.cameras.camera import CameraFeed
 from webmap.features.cameras.camera_panel import (
     CameraPanel,
     CameraViews,

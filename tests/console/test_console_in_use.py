@@ -12,8 +12,8 @@ from webmap.core.page import Page
 from webmap.discovery import discover
 from webmap.discovery.doctor import BridgeFacts
 from webmap.discovery.doctor.facts import merge_configured
+from webmap.features.doctor.configured_robots import configured_robots
 from webmap.features.doctor.doctor_panel import DoctorReports, checkup_of
-from webmap.features.doctor.in_use import in_use
 from webmap.scene.element import Event
 from webmap.scene.wire.session import SceneSession
 
@@ -47,7 +47,7 @@ def test_a_configured_robot_uses_the_topics_of_its_configuration(bridge):
             "move": {"action": "/navigate_to_pose"},
         }
     )
-    bob = only(in_use([make_robot(config, [bridge])], bridge))
+    bob = only(configured_robots([make_robot(config, [bridge])], bridge))
     assert bob.name == "Bob"
     assert bob.topics["odometry"] == (("/odom", ""),)
     assert bob.topics["velocity"] == (("/cmd_vel", "geometry_msgs/TwistStamped"),)
@@ -66,7 +66,7 @@ def test_topics_of_modules_are_in_use_with_positional_and_keyword_arguments(brid
     bob.add_module("Path", bridge)
     bob.add_module("PointCloud", bridge, "/points")
     bob.add_module("OnMaps", "OccupancyGrid", bridge, "/costs", palette="costmap")
-    topics = only(in_use([bob], bridge)).topics
+    topics = only(configured_robots([bob], bridge)).topics
     assert topics["scan"] == (("/front", ""), ("/rear", ""))
     assert topics["plan"] == (("/plan", ""),)
     assert topics["cloud"] == (("/points", ""),)
@@ -83,7 +83,9 @@ def test_a_shared_map_is_used_by_all_robots_and_a_costmap_only_by_its_robot(brid
         (bridge, "/ann/costs"),
         {"palette": "costmap", "robot": ann},
     )
-    bobs, anns = (one.topics for one in in_use([bob, ann], bridge, [shared, own]))
+    bobs, anns = (
+        one.topics for one in configured_robots([bob, ann], bridge, [shared, own])
+    )
     assert bobs["map"] == anns["map"] == (("/hall", ""),)
     assert bobs["costmap"] == ()
     assert anns["costmap"] == (("/ann/costs", ""),)
@@ -95,7 +97,10 @@ def test_a_robot_with_two_bridges_has_at_each_bridge_only_its_topics_there(
     bob = Robot("Bob")
     bob.set_odometry_topic(other, "/odom", type="nav_msgs/Odometry")
     bob.set_twist_topic(bridge, "/cmd_vel", type="geometry_msgs/Twist")
-    here, there = only(in_use([bob], bridge)), only(in_use([bob], other))
+    here, there = (
+        only(configured_robots([bob], bridge)),
+        only(configured_robots([bob], other)),
+    )
     assert here.topics["odometry"] == there.topics["velocity"] == ()
     assert here.elsewhere == {"odometry"}
     assert there.elsewhere == {"velocity"}
@@ -105,13 +110,16 @@ def test_a_robot_with_two_bridges_has_at_each_bridge_only_its_topics_there(
 def test_a_robot_of_another_bridge_is_not_listed_at_this_bridge(bridge, other):
     bob = Robot("Bob")
     bob.set_odometry_topic(other, "/odom")
-    assert in_use([bob], bridge, [("OccupancyGrid", (bridge, "/map"), {})]) == []
+    assert (
+        configured_robots([bob], bridge, [("OccupancyGrid", (bridge, "/map"), {})])
+        == []
+    )
 
 
 def test_a_robot_with_tf_uses_its_tf_topic_and_its_frames(bridge):
     bob = Robot("Bob")
     bob.set_tf(bridge, namespace="/bob", map_frame="site")
-    configured = only(in_use([bob], bridge))
+    configured = only(configured_robots([bob], bridge))
     assert configured.topics["tf"] == (("/bob/tf", ""),)
     topics = {"/bob/tf": "tf2_msgs/TFMessage"}
     (robot,) = merge_configured(discover(topics), [configured], topics)[0].robots
@@ -122,7 +130,7 @@ def test_a_robot_with_tf_uses_its_tf_topic_and_its_frames(bridge):
 def test_a_robot_without_a_source_of_poses_uses_no_tf_topic(bridge):
     bob = Robot("Bob")
     bob.set_twist_topic(bridge, "/cmd_vel", type="geometry_msgs/Twist")
-    assert only(in_use([bob], bridge)).topics["tf"] == ()
+    assert only(configured_robots([bob], bridge)).topics["tf"] == ()
 
 
 # The report on a page.

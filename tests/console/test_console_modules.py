@@ -7,11 +7,9 @@ import pytest
 from webmap import Map, Robot
 from webmap.core.base_page import PageEntry, Viewer
 from webmap.core.page import Page
-from webmap.features.goals.goal_tool import GoalTool
+from webmap.features.goals.goals import GoalTool
 from webmap.features.stop.stop_button import StopButton
-from webmap.features.view.follow import Follow
-from webmap.features.view.pointer_readout import PointerReadout
-from webmap.features.view.scale_bar import ScaleBar
+from webmap.features.view.view import Follow, PointerReadout, ScaleBar
 from webmap.scene.wire.session import SceneSession
 
 PACKAGE = Path(__file__).parents[2] / "src" / "webmap"

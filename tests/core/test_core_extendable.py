@@ -7,6 +7,7 @@ import pytest
 from webmap import Extendable, Map, Namespace, Robot
 from webmap.base.errors import ConfigError, ModuleNotFound
 from webmap.base.scope import Removal, current_scope, keep
+from webmap.core.registry import _built_in_files, map_modules, robot_modules
 
 
 @pytest.fixture
@@ -44,6 +45,14 @@ def test_the_built_in_modules_are_found_by_name():
     assert "LaserScanner" in dir(webmap.modules.robot)
     view_control = webmap.modules.map.MouseViewControl
     assert view_control is webmap.modules.map.MapViewControl
+
+
+def test_each_built_in_module_is_found_by_its_name_alone():
+    for namespace in (map_modules, robot_modules):
+        for name in namespace.names():
+            module = namespace[name].__module__
+            if module.startswith("webmap."):
+                assert _built_in_files().get(name) == module, f"add {name} to FILES"
 
 
 def test_a_module_name_can_be_registered_only_once(namespace):

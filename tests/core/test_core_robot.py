@@ -14,7 +14,7 @@ from webmap.base.errors import ConfigError, MotionError
 from webmap.base.scope import Removal, Scope
 from webmap.core.runtime import goal_message, twist_message
 from webmap.gate.protocol import SentGoal, SentTwist
-from webmap.poses import type_query
+from webmap.poses import odometry
 from webmap.ros import messages
 
 
@@ -191,7 +191,7 @@ def test_a_refused_topic_is_not_given_to_the_gate_as_odometry():
 def test_rosapi_gives_the_type_of_a_pose_topic_before_its_first_message(
     monkeypatch,
 ):
-    monkeypatch.setattr(type_query, "SOON", 0.01)
+    monkeypatch.setattr(odometry, "SOON", 0.01)
 
     async def scenario():
         link = Link()

@@ -6,10 +6,9 @@ import time
 
 import numpy as np
 
-from webmap.ros.rosbridge.server.dialect import Dialect
+from webmap.ros.rosbridge.server.dialect import Dialect, parse_quirks
 from webmap.ros.rosbridge.server.encode import MAX_MESSAGE_SIZE, Encoder
 from webmap.ros.rosbridge.server.graph import Graph
-from webmap.ros.rosbridge.server.quirks import parse_quirks
 from webmap.ros.rosbridge.server.rosapi import Rosapi
 from webmap.ros.rosbridge.server.schema import Schema
 from webmap.ros.rosbridge.server.server import RosbridgeServer

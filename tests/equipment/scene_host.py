@@ -15,7 +15,7 @@ from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from webmap.scene import svg
-from webmap.scene.bound import Document
+from webmap.scene.document import Document
 from webmap.scene.node import Fragment
 from webmap.scene.wire.messages import PageHello, read_message
 from webmap.scene.wire.session import SceneSession

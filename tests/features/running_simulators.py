@@ -6,10 +6,9 @@ import threading
 from collections.abc import Iterator
 from typing import Any
 
-from webmap.ros.rosbridge.server.dialect import Dialect
+from webmap.ros.rosbridge.server.dialect import Dialect, dialect_of, parse_quirks
 from webmap.ros.rosbridge.server.encode import Encoder
 from webmap.ros.rosbridge.server.graph import Graph
-from webmap.ros.rosbridge.server.quirks import dialect_of, parse_quirks
 from webmap.ros.rosbridge.server.rosapi import Rosapi
 from webmap.ros.rosbridge.server.schema import Schema
 from webmap.ros.rosbridge.server.server import RosbridgeServer

@@ -25,7 +25,7 @@ def frames():
 def pipeline(frames):
     """A robot with a pose topic; frames place its poses on the map."""
     pipeline = PosePipeline()
-    pipeline.placing = Placing(frames, "map", "base_link")
+    pipeline.placing = Placing(frames.buffer, frames.namespace, "map", "base_link")
     pipeline.restart(0.1)
     return pipeline
 

@@ -8,11 +8,10 @@ import pytest
 from webmap import Bridge, Robot
 from webmap.base.scope import Removal
 from webmap.core.motion import RobotMotion
-from webmap.poses.type_query import FEW, LATER, SHARE, SOON
-from webmap.ros.rosbridge.server.dialect import Dialect
+from webmap.poses.odometry import FEW, LATER, SHARE, SOON
+from webmap.ros.rosbridge.server.dialect import Dialect, parse_quirks
 from webmap.ros.rosbridge.server.encode import Encoder
 from webmap.ros.rosbridge.server.graph import Graph
-from webmap.ros.rosbridge.server.quirks import parse_quirks
 from webmap.ros.rosbridge.server.rosapi import Rosapi
 from webmap.ros.rosbridge.server.schema import Schema
 from webmap.ros.rosbridge.server.server import RosbridgeServer
@@ -94,7 +93,7 @@ def received(monkeypatch):
     gate = Gate()
     monkeypatch.setattr(RobotMotion, "gate", gate)
     clock = SimpleNamespace(monotonic=lambda: 0.0)  # rosapi answers at once
-    monkeypatch.setattr("webmap.poses.type_query.time", clock)
+    monkeypatch.setattr("webmap.poses.odometry.time", clock)
 
     def run(scenario):
         async def all_of_it():
@@ -149,7 +148,7 @@ def test_a_slow_rosapi_is_asked_less_often(received, monkeypatch):
     async def scenario(robot, link, time):
         clock = SimpleNamespace(monotonic=iter([0.0, 5.0]).__next__)
         with monkeypatch.context() as patch:
-            patch.setattr("webmap.poses.type_query.time", clock)
+            patch.setattr("webmap.poses.odometry.time", clock)
             await time.passes()
         assert time.pauses[-1] == 5.0 * SHARE
 
@@ -231,7 +230,7 @@ def test_a_late_type_answer_for_a_replaced_topic_is_ignored(received):
 
 
 def test_a_rosapi_that_starts_after_rosbridge_is_asked_for_the_type(monkeypatch):
-    monkeypatch.setattr("webmap.poses.type_query.SOON", 0.05)
+    monkeypatch.setattr("webmap.poses.odometry.SOON", 0.05)
 
     async def scenario():
         quirks = parse_quirks("real", "ros2")

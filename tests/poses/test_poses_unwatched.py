@@ -8,7 +8,7 @@ from pose_script import ODOMETRY, odometry, play, transform, transforms
 
 from webmap import Bridge, Robot
 from webmap.base.audience import RARELY, audience
-from webmap.features.alerts.alert_watch import conditions
+from webmap.features.alerts.alerts import conditions
 from webmap.poses.silence import PERIODS
 
 LOST_AFTER = PERIODS * RARELY / 1000

@@ -11,8 +11,7 @@ from pose_script import CountingLoop, odometry
 import webmap
 from webmap.base.audience import RARELY, audience
 from webmap.console.robot_looks import make_robot
-from webmap.features.alerts.alert_watch import AlertWatch
-from webmap.features.alerts.alerts import Alerts
+from webmap.features.alerts.alerts import Alerts, AlertWatch
 
 URL = "ws://robot:9090"
 PERIOD = RARELY / 1000

@@ -5,8 +5,8 @@ import math
 import pytest
 
 from webmap.base.errors import ConfigError
-from webmap.ros.conforming import Misfit
 from webmap.ros.definitions import Definitions, UnknownType, shipped
+from webmap.ros.message_check import Misfit
 from webmap.ros.message_forms import (
     checked,
     entry_of,

@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 
 from webmap.base.errors import ProtocolError
 from webmap.ros.limits import MAX_FRAME
-from webmap.ros.rosbridge.incoming import (
+from webmap.ros.rosbridge.frame_reader import (
     KEPT,
     MOST_FRAGMENTS,
     PIECE,
     SHORTENED,
-    Incoming,
+    FrameReader,
 )
 
 
@@ -31,7 +31,7 @@ class Reader:
 
     def __init__(self, handshake_done=True):
         self.messages, self.others = [], b""
-        self.incoming = Incoming(self.other)
+        self.incoming = FrameReader(self.other)
         self.incoming.message = self.messages.append
         self.incoming.handshake_done = handshake_done
         self.steps = 0
@@ -156,8 +156,8 @@ def test_during_the_handshake_each_line_is_a_step():
 
 
 def test_bytes_that_wait_are_not_copied_again_for_each_that_comes():
-    incoming = Incoming(bytes)
-    incoming.handshake_done = True
+    incoming = FrameReader(bytes)
+    incoming.shaken = True
     incoming.feed(bytes(1 << 20))
     incoming.feed(b"x")
     kept = incoming._data

@@ -10,10 +10,9 @@ from equipment.fake_rosbridge import bridged, until
 from webmap.base.scope import Scope
 from webmap.ros.bridge import Bridge
 from webmap.ros.rosbridge import wire_subscription
-from webmap.ros.rosbridge.server.dialect import Dialect
+from webmap.ros.rosbridge.server.dialect import Dialect, parse_quirks
 from webmap.ros.rosbridge.server.encode import Encoder
 from webmap.ros.rosbridge.server.graph import Graph
-from webmap.ros.rosbridge.server.quirks import parse_quirks
 from webmap.ros.rosbridge.server.rosapi import Rosapi
 from webmap.ros.rosbridge.server.schema import Schema
 from webmap.ros.rosbridge.server.server import RosbridgeServer

@@ -20,14 +20,15 @@ from webmap.ros.limits import (
     limit_of,
 )
 from webmap.ros.messages import TFMessage
-from webmap.ros.rosbridge.events import Malformed, Publish
-from webmap.ros.rosbridge.frame_limits import (
+from webmap.ros.rosbridge.events import (
     MAX_ITEMS,
     MAX_NUMBERS,
     MAX_OTHER,
+    Malformed,
+    Publish,
     check_count,
 )
-from webmap.ros.rosbridge.incoming import SHORTENED
+from webmap.ros.rosbridge.frame_reader import SHORTENED
 from webmap.ros.rosbridge.protocol import Protocol
 
 MIB = 1 << 20

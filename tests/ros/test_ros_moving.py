@@ -2,7 +2,7 @@
 
 import pytest
 
-from webmap.ros.moving import moved_by_both, moved_by_name, moved_by_type
+from webmap.ros.motion_topics import moved_by_both, moved_by_name, moved_by_type
 
 SIMULATED = "the place or the speed of a simulated robot"
 

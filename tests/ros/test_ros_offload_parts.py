@@ -11,7 +11,7 @@ from test_ros_limits import publish, transforms
 
 from equipment.fake_rosbridge import until
 from webmap.features.layers.diagnostics import DiagnosticArrayMsg
-from webmap.features.layers.markers.messages import MarkerArrayMsg
+from webmap.features.layers.marker_drawing import MarkerArrayMsg
 from webmap.ros import offload, worker
 from webmap.ros.messages import OccupancyGridMsg, PathMsg, TFMessage
 from webmap.ros.offload import Offload

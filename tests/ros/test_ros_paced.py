@@ -9,7 +9,7 @@ import time
 import pytest
 
 from webmap.ros.rosbridge.connection import BridgeConnection
-from webmap.ros.rosbridge.incoming import MOST_FRAGMENTS
+from webmap.ros.rosbridge.frame_reader import MOST_FRAGMENTS
 from webmap.testing import Sentinel
 
 MAGIC = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"

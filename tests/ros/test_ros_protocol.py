@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from equipment.captured_frames import CAPTURED
 from webmap.base.errors import ProtocolError
+from webmap.poses.placing import ODOMETRY_VIEWS
 from webmap.ros import messages
 from webmap.ros.rosbridge.events import (
     CallService,
@@ -18,7 +19,6 @@ from webmap.ros.rosbridge.events import (
     Unknown,
 )
 from webmap.ros.rosbridge.protocol import Fragments, Protocol, topic_in_head
-from webmap.ros.views import ODOMETRY_VIEWS
 
 pytestmark = pytest.mark.slow
 

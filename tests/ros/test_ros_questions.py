@@ -7,7 +7,8 @@ import pytest
 from equipment.fake_rosbridge import FakeRosbridge, bridged, until
 from webmap.base.errors import BridgeClosed, ConfigError, ServiceError
 from webmap.base.lifecycle import lifecycle
-from webmap.ros.bridge import Bridge, TemporaryBridge
+from webmap.ros.bridge import Bridge
+from webmap.ros.temporary_bridge import TemporaryBridge
 
 NODES = {"publishers": ["/base", "/rosbridge_websocket"], "subscribers": ["/webmap"]}
 

@@ -6,15 +6,15 @@ import pytest
 
 from equipment.captured_frames import CAPTURED
 from webmap.base.errors import ConfigError, ProtocolError
-from webmap.ros import messages
-from webmap.ros.arrays import Floats, Int8s
-from webmap.ros.decoding import convert
-from webmap.ros.rosbridge.cbor import typed_array
-from webmap.ros.views import (
+from webmap.poses.placing import (
     ODOMETRY_VIEWS,
     odometry_view,
     odometry_view_by_shape,
 )
+from webmap.ros import messages
+from webmap.ros.arrays import Floats, Int8s
+from webmap.ros.decoding import convert
+from webmap.ros.rosbridge.cbor import typed_array
 
 PLACE = {
     "position": {"x": 1.0, "y": 2.0, "z": 0.0},

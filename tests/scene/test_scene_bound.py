@@ -2,7 +2,7 @@ import pytest
 
 from webmap.base.errors import SceneError
 from webmap.scene import html, svg
-from webmap.scene.bound import Document
+from webmap.scene.document import Document
 from webmap.scene.node import Changed, Fragment
 
 

@@ -12,9 +12,8 @@ import pytest
 from PIL import Image
 
 from webmap.base.geometry import Pose
-from webmap.ros.rosbridge.server.dialect import Dialect
+from webmap.ros.rosbridge.server.dialect import POLITE, Dialect
 from webmap.ros.rosbridge.server.encode import Encoder, Publication
-from webmap.ros.rosbridge.server.quirks import POLITE
 from webmap.ros.rosbridge.server.schema import Schema
 from webmap.sim.maps import FloorPlan, Obstacles
 from webmap.sim.messages import Messages

@@ -11,9 +11,8 @@ import pytest
 from PIL import Image
 
 from equipment.captured_frames import CAPTURED, frame_file
-from webmap.ros.rosbridge.server.dialect import Dialect
+from webmap.ros.rosbridge.server.dialect import POLITE, REAL, USUAL, Dialect
 from webmap.ros.rosbridge.server.encode import Encoder, Publication, serialize
-from webmap.ros.rosbridge.server.quirks import POLITE, REAL, USUAL
 from webmap.ros.rosbridge.server.schema import Schema
 
 TYPES = {

@@ -125,8 +125,8 @@ def test_topics_without_subscribers_are_not_computed(monkeypatch):
 
 
 def test_without_extras_the_extra_topics_are_missing(monkeypatch):
+    from webmap.ros.rosbridge.server.dialect import parse_quirks
     from webmap.ros.rosbridge.server.graph import Graph
-    from webmap.ros.rosbridge.server.quirks import parse_quirks
     from webmap.sim.node import RobotsNode
 
     bench = Bench()

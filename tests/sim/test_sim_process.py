@@ -19,10 +19,15 @@ from websockets.asyncio.client import connect
 from equipment.captured_frames import PLAYER, frame_file, played
 from equipment.frame_player import load_recording
 from webmap.base.errors import ConfigError
-from webmap.ros.rosbridge.server.dialect import Dialect
+from webmap.ros.rosbridge.server.dialect import (
+    POLITE,
+    REAL,
+    Dialect,
+    Quirks,
+    parse_quirks,
+)
 from webmap.ros.rosbridge.server.encode import Encoder
 from webmap.ros.rosbridge.server.graph import Graph
-from webmap.ros.rosbridge.server.quirks import POLITE, REAL, Quirks, parse_quirks
 from webmap.ros.rosbridge.server.rosapi import Rosapi
 from webmap.ros.rosbridge.server.schema import Schema
 from webmap.ros.rosbridge.server.server import RosbridgeServer

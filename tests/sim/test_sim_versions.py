@@ -13,7 +13,7 @@ from webmap.ros.messages import OdometryMsg
 from webmap.ros.rosbridge import ops
 from webmap.ros.rosbridge.events import Publish
 from webmap.ros.rosbridge.protocol import Protocol
-from webmap.ros.rosbridge.server.quirks import REAL, dialect_of
+from webmap.ros.rosbridge.server.dialect import REAL, dialect_of
 from webmap.sim import run_simulator
 
 NEWER = "4.2"

@@ -19,7 +19,7 @@ from webmap import Robot
 from webmap.base.errors import ConfigError
 from webmap.base.lifecycle import Lifecycle
 from webmap.core.pictures import pictures
-from webmap.features.cameras import http_camera
+from webmap.features.cameras import camera as camera_module
 from webmap.ros.image_pull import HttpResponseParser
 from webmap.sim import run_simulator, web_video
 from webmap.sim.web_video import (
@@ -390,7 +390,7 @@ def simulator():
 
 
 def test_the_display_shows_the_picture_of_a_simulated_camera(monkeypatch):
-    monkeypatch.setattr(http_camera, "lifecycle", Lifecycle())
+    monkeypatch.setattr(camera_module, "lifecycle", Lifecycle())
 
     def shown(camera):
         published = pictures.get(camera.url.rpartition("/")[2])
@@ -405,7 +405,7 @@ def test_the_display_shows_the_picture_of_a_simulated_camera(monkeypatch):
 
     async def scenario(bridge, stream):
         robot = Robot("Bob")
-        http_camera.lifecycle.begin(asyncio.get_running_loop())
+        camera_module.lifecycle.begin(asyncio.get_running_loop())
         snapshot = stream.replace("/stream", "/snapshot") + "&width=64"
         cameras = [
             robot.add_module("HttpCamera", address, throttle=0)
@@ -422,7 +422,7 @@ def test_the_display_shows_the_picture_of_a_simulated_camera(monkeypatch):
             assert not robot.problems
         finally:
             robot.destroy()
-            await http_camera.lifecycle.end()
+            await camera_module.lifecycle.end()
 
     with simulator() as (bridge, stream):
         assert stream.endswith(STREAM)

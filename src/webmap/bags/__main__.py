@@ -13,8 +13,8 @@ from webmap.base.errors import ConfigError, WebMapError
 from webmap.base.logs import set_up_logging
 from webmap.base.processes import end_with_parent, why_not_listening
 from webmap.base.text import one_line
+from webmap.ros.rosbridge.server.dialect import POLITE
 from webmap.ros.rosbridge.server.encode import Encoder
-from webmap.ros.rosbridge.server.quirks import POLITE
 from webmap.ros.rosbridge.server.server import RosbridgeServer
 from webmap.sim.process import signals_set
 

@@ -25,6 +25,7 @@ from webmap.bags.playback import (
 from webmap.bags.recording import FRAMES, AllFrames, Recorded, Recording, is_static
 from webmap.bags.times import SECOND, Pace, Stamps
 from webmap.base.errors import ConfigError
+from webmap.ros.rosbridge.server.dialect import POLITE
 from webmap.ros.rosbridge.server.graph import (
     BRIDGE_NODE,
     Deliver,
@@ -32,7 +33,6 @@ from webmap.ros.rosbridge.server.graph import (
     GraphError,
     ServiceHandler,
 )
-from webmap.ros.rosbridge.server.quirks import POLITE
 from webmap.ros.rosbridge.server.rosapi import Rosapi
 from webmap.ros.rosbridge.server.schema import Schema
 

@@ -16,11 +16,11 @@ from webmap.bags.types import Types
 from webmap.base.echo import echo
 from webmap.base.errors import BridgeError, ConfigError, ServiceError
 from webmap.base.text import counted
-from webmap.ros.asking import ask_topics
 from webmap.ros.bridge import Bridge
 from webmap.ros.names import is_type, normalise_topic, split_type
-from webmap.ros.received import ReceivedMessage
+from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.rosbridge.server.dialect import DialectName
+from webmap.ros.temporary_bridge import ask_topics
 from webmap.sim.process import signals_set
 
 EVERY = 10.0

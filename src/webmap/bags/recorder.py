@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 from webmap.bags.recording import is_latched
 from webmap.bags.types import Types, TypeVersion
 from webmap.base.errors import ConfigError, ProtocolError
-from webmap.ros.conforming import Misfit
-from webmap.ros.received import ReceivedMessage
+from webmap.ros.message_check import Misfit
+from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.rosbridge.server.dialect import DialectName, canonical
 
 if TYPE_CHECKING:

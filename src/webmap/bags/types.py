@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from webmap.base.errors import ConfigError
-from webmap.ros.conforming import Conformer, Misfit, check_size, wrong
 from webmap.ros.definitions import (
     FLOATS,
     INTEGERS,
@@ -24,6 +23,7 @@ from webmap.ros.definitions import (
     UnknownType,
     shipped,
 )
+from webmap.ros.message_check import MessageCheck, Misfit, check_size, wrong
 from webmap.ros.names import ros2_type
 from webmap.ros.rosbridge.server.dialect import DialectName, canonical
 from webmap.ros.rosbridge.server.encode import serialize
@@ -172,7 +172,7 @@ class Types:
         return self._stores[release]
 
 
-class _FromRobot(Conformer):
+class _FromRobot(MessageCheck):
     """Accepts complete messages, in every encoding of a rosbridge.
 
     In JSON ``null`` means a float that is not finite; it becomes NaN. Bytes come as

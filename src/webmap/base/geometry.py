@@ -4,8 +4,9 @@ Lengths are metres and angles radians unless a name shows another unit (REP 103)
 """
 
 import math
-from dataclasses import dataclass
 from typing import Protocol
+
+import msgspec
 
 from webmap.base.errors import ConfigError
 
@@ -17,8 +18,7 @@ the whole view then fits nothing.
 """
 
 
-@dataclass(frozen=True, slots=True)
-class Vector3:
+class Vector3(msgspec.Struct, frozen=True, gc=False):
     """Three numbers along x, y and z, as in ``geometry_msgs/Vector3`` and ``Point``."""
 
     x: float = 0.0
@@ -36,8 +36,7 @@ def normalize_angle(angle: float) -> float:
     return math.remainder(angle, math.tau)
 
 
-@dataclass(frozen=True, slots=True)
-class Quaternion:
+class Quaternion(msgspec.Struct, frozen=True, gc=False):
     """An orientation, with the component names of ``geometry_msgs/Quaternion``."""
 
     x: float = 0.0
@@ -67,8 +66,7 @@ class Quaternion:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Twist:
+class Twist(msgspec.Struct, frozen=True, gc=False):
     """The velocity of a robot's base in its own frame.
 
     The first three numbers move it in the plane. The others are 0 for every base that
@@ -126,8 +124,7 @@ class Twist:
         }
 
 
-@dataclass(frozen=True, slots=True)
-class Pose:
+class Pose(msgspec.Struct, frozen=True, gc=False):
     """A position and a heading in the plane of a frame that the context defines."""
 
     x: float = 0.0
@@ -159,8 +156,7 @@ class Pose:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Affine:
+class Affine(msgspec.Struct, frozen=True, gc=False):
     """An affine transform of the plane, with the component names of ``SVGMatrix``.
 
     A point ``(x, y)`` becomes ``(a*x + c*y + e, b*x + d*y + f)``.
@@ -178,6 +174,15 @@ class Affine:
         """Return the transform from the frame that has this pose to the outer frame."""
         cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
         return cls(cos, sin, -sin, cos, pose.x, pose.y)
+
+    @classmethod
+    def into_pose(cls, pose: "Pose") -> "Affine":
+        """Return the transform from the outer frame to the frame that has this pose."""
+        cos, sin = math.cos(pose.yaw), math.sin(pose.yaw)
+        det = cos * cos + sin * sin
+        a, b = cos / det, sin / det
+        x, y = pose.x, pose.y
+        return cls(a, -b, b, a, -(a * x + b * y), -(-b * x + a * y))
 
     @classmethod
     def translation(cls, x: float, y: float) -> "Affine":

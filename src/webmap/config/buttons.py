@@ -8,10 +8,10 @@ from typing import Any, Literal
 
 from webmap.base.errors import ConfigError
 from webmap.config.checks import KeyPath, Mistakes, did_you_mean
-from webmap.ros.conforming import Misfit
 from webmap.ros.definitions import UnknownType
+from webmap.ros.message_check import Misfit
 from webmap.ros.message_forms import checked, fields_of
-from webmap.ros.moving import moved_by_both, moved_by_name, moved_by_type
+from webmap.ros.motion_topics import moved_by_both, moved_by_name, moved_by_type
 from webmap.ros.names import normalise_topic, split_type
 
 ButtonKind = Literal["service", "topic", "parameter"]

@@ -5,8 +5,7 @@ import weakref
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from webmap.features.alerts.alert_watch import AlertWatch
-from webmap.features.alerts.alerts import Alerts
+from webmap.features.alerts.alerts import Alerts, AlertWatch
 
 if TYPE_CHECKING:
     from webmap import Bridge, Page, Robot

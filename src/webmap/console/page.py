@@ -18,7 +18,7 @@ from webmap.console.floor import Floor, load_floor
 from webmap.console.robot_card import RobotButtons, RobotCard
 from webmap.console.robot_list import RobotList
 from webmap.console.robot_looks import make_robot
-from webmap.features.alerts.alert_panel import AlertPanel
+from webmap.features.alerts.alerts import AlertPanel
 from webmap.features.cameras.camera_panel import CameraPanel
 from webmap.features.doctor.doctor_panel import DoctorReports
 from webmap.features.selection.several_robots import SeveralRobots

@@ -13,7 +13,7 @@ from webmap.base.scope import Removal, Scope, current_scope
 from webmap.base.tasks import begin
 from webmap.core.pictures import Publisher
 from webmap.gate.protocol import Role
-from webmap.scene.bound import BoundElement, Document
+from webmap.scene.document import BoundElement, Document
 from webmap.scene.element import Element, Event, Handler, Listener
 from webmap.scene.node import Fragment
 from webmap.scene.wire.session import SceneSession

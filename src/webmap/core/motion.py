@@ -30,9 +30,9 @@ from webmap.gate.limits import PLANE, Axes
 from webmap.gate.protocol import AssistSpec, RobotReport, RobotSpec
 from webmap.gate.rules.assist import polygon_around
 from webmap.gate.specs import checked, checked_assist
-from webmap.poses.type_query import TypeQuery
+from webmap.poses.odometry import TypeQuery
 from webmap.ros.bridge import Bridge
-from webmap.ros.moving import STOP
+from webmap.ros.motion_topics import STOP
 from webmap.ros.names import is_agent_url, is_type
 
 if TYPE_CHECKING:

@@ -111,7 +111,9 @@ class PoseSource:
         """Transform poses to the frame of the map; see :meth:`Robot.set_tf`."""
         self.unplace()
         frames = self.frames = frames_of(bridge, namespace)
-        placing = Placing(frames, map_frame, base_frame, quiet=quiet)
+        placing = Placing(
+            frames.buffer, frames.namespace, map_frame, base_frame, quiet=quiet
+        )
         self.pipeline.placing = placing
         self._robot.motion.base_frame = placing.base_frame
         self._frames_removal = frames.join(self._on_frames, self._needs_frames)

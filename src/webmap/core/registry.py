@@ -18,7 +18,10 @@ Factory = Callable[..., Any]
 T = TypeVar("T", bound=Factory)
 
 BUILT_IN = "webmap.features"
-"""The package of the built-in modules; each of its folders is a subpackage."""
+"""The package of the built-in modules; each of its folders is a subpackage.
+
+Its ``FILES`` has the file of each module that is not in a file of its own name.
+"""
 
 _imported: set[str] = set()
 """The files of built-in modules that were imported, also those without a module."""
@@ -28,9 +31,10 @@ class Namespace:
     """The modules that one kind of owner can add, by name.
 
     A module is registered by :meth:`register`. A built-in module is a class of
-    ``webmap.features`` in a file of the same name: ``LaserScanner`` is in
-    ``laser_scanner.py``, which is imported when the name is first used. Another package
-    has an entry point for each of its modules.
+    ``webmap.features``, mostly in a file of the same name: ``LaserScanner`` is in
+    ``laser_scanner.py``, which is imported when the name is first used. Modules that
+    share a file are in ``FILES`` there. Another package has an entry point for each of
+    its modules.
 
     Args:
         kind: The kind of the owner, for error messages.
@@ -153,6 +157,8 @@ def _built_in_files() -> dict[object, str]:
         for file in pkgutil.iter_modules(spec.submodule_search_locations or ()):
             name = "".join(word.capitalize() for word in file.name.split("_"))
             files[name] = f"{BUILT_IN}.{folder.name}.{file.name}"
+    for name, path in importlib.import_module(BUILT_IN).FILES.items():
+        files[name] = f"{BUILT_IN}.{path}"
     return files
 
 

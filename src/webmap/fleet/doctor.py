@@ -63,17 +63,20 @@ def _always(robots: Sequence[ConfiguredRobot]) -> Configured:
 
 
 def _of_file(file: Path) -> list[tuple[str, Configured]]:
-    from webmap.features.doctor.in_use import Made, in_use
+    from webmap.features.doctor.configured_robots import (
+        ModuleArguments,
+        configured_robots,
+    )
     from webmap.fleet.fleet_file import prepare
 
     ready = prepare(file)
-    maps: list[Made] = []
+    maps: list[ModuleArguments] = []
     for grid in ready.fleet.map:
         where = (ready.bridges[grid.bridge], grid.topic)
         maps.append(("OccupancyGrid", where, {"palette": grid.palette}))
     return [
         *(
-            (bridge.url, _always(in_use(ready.robots, bridge, maps)))
+            (bridge.url, _always(configured_robots(ready.robots, bridge, maps)))
             for bridge in ready.bridges.values()
         ),
         *((url, _always(())) for url in ready.agents),

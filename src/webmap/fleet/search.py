@@ -25,8 +25,8 @@ from webmap.fleet.robot_options import (
     same_name_error,
 )
 from webmap.fleet.view_robots import ViewRobot, ViewRobots
-from webmap.ros.asking import ask_topics
 from webmap.ros.names import agent_named, is_topic, is_type, normalise_topic
+from webmap.ros.temporary_bridge import ask_topics
 
 if TYPE_CHECKING:
     from webmap import Bridge

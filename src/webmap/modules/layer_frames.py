@@ -8,8 +8,8 @@ from webmap.core.layer import Layer
 from webmap.modules.placed import put
 from webmap.modules.sighting import newest_or_at
 from webmap.poses.alignment import alignments
-from webmap.poses.frames import Frames, frames_of, lasting
-from webmap.poses.lasting import Lasting
+from webmap.poses.frames import Frames, delayed_problem, frames_of
+from webmap.poses.placing import ProblemDelay
 from webmap.ros.bridge import Bridge
 from webmap.ros.tf import Transform, TransformError
 
@@ -48,7 +48,7 @@ class LayerFrames:
         self._namespace = namespace
         self._robot = robot
         self._frames: Frames | None = None
-        self._lasting = Lasting()
+        self._problem_delay = ProblemDelay()
         self._aligned: Pose | None = None
         self._begin()
         with layer.scope.active():
@@ -93,7 +93,7 @@ class LayerFrames:
 
     def _show_trouble(self, text: str) -> None:
         """Show a problem of the frames once it has lasted, or clear it."""
-        if lasting(self._lasting, "lost" if text else "", self._frames):
+        if delayed_problem(self._problem_delay, "lost" if text else "", self._frames):
             self._layer.set_problem(self, text)
         elif not text:
             self._layer.clear_problem(self)

@@ -3,7 +3,6 @@
 import logging
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from webmap.base.audience import audience
@@ -11,8 +10,8 @@ from webmap.base.errors import ConfigError
 from webmap.base.geometry import Affine, Pose, Vector3
 from webmap.base.scope import Removal, keep
 from webmap.modules.sighting import Sighting, Sightings
-from webmap.poses.frames import lasting
-from webmap.poses.lasting import Lasting
+from webmap.poses.frames import delayed_problem
+from webmap.poses.placing import ProblemDelay
 from webmap.ros.tf import Transform
 from webmap.ros.tf.transform import alike
 from webmap.scene import svg
@@ -86,6 +85,8 @@ class Placed:
             robot.pose_source, frame, mount if mount != Pose() else None
         )
         self._seen: tuple[str, float] | None = None
+        self._looked_up: tuple[str, float, Sighting] | None = None
+        """The pose that :meth:`moved_within` needed, for the same message."""
         self._draw: Draw | None = None
         self._drawn: Transform | None = None
         self._offset = Affine.of_pose(mount)
@@ -95,7 +96,7 @@ class Placed:
         self._settled = True
         self._upright: dict[Element, tuple[float, float]] = {}
         self._trouble = ""
-        self._lasting = Lasting()
+        self._problem_delay = ProblemDelay()
         self.svg = svg.g(*children, class_=class_, pointer_events="none")
         if frame == "map":
             robot.svg.insert(robot.svg.children.index(robot.model), self.svg)
@@ -125,11 +126,16 @@ class Placed:
                 plane of the frame.
 
         """
+        known, self._looked_up = self._looked_up, None
+        if known is not None and known[:2] == (frame_id, stamp):
+            found = known[2]
+        else:
+            found = self._sightings.look(frame_id, stamp)
         before = (self._seen, self._draw, self._drawn)
         self._seen = (frame_id, stamp)
         self._draw, self._drawn = draw, None
         try:
-            self._settle()
+            self._place(found)
         except BaseException:
             self._seen, self._draw, self._drawn = before
             raise
@@ -145,9 +151,9 @@ class Placed:
         """
         if not stamp:
             return Pose()
-        then, later = (
-            self._sightings.look(frame_id, stamp + after) for after in (0.0, seconds)
-        )
+        then = self._sightings.look(frame_id, stamp)
+        self._looked_up = (frame_id, stamp, then)
+        later = self._sightings.look(frame_id, stamp + seconds)
         if then.on_robot or later.on_robot:
             return Pose()
         return (then.offset.inverse @ later.offset).planar
@@ -180,15 +186,17 @@ class Placed:
 
     def _settle(self) -> None:
         """Determine the current pose of the group as well as possible."""
-        if self._seen is None:
-            return
-        found = self._sightings.look(*self._seen)
+        if self._seen is not None:
+            self._place(self._sightings.look(*self._seen))
+
+    def _place(self, found: Sighting) -> None:
+        """Draw the data and put the group at a pose."""
         if self._draw is None:
             offset = found.offset.from_above
         else:
             pose, tilt = found.offset.heading_and_tilt
             lift = Vector3(0.0, 0.0, tilt.translation.z - found.ground)
-            self._tilt(self._draw, replace(tilt, translation=lift))
+            self._tilt(self._draw, Transform(lift, tilt.rotation))
             offset = Affine.of_pose(pose)
         # Only now, since drawing may fail: the earlier drawing then stays in place.
         self._offset, self._on_robot = offset, found.on_robot
@@ -205,11 +213,10 @@ class Placed:
     def _put(self) -> None:
         place = self._offset
         if not self._on_robot:
-            at = self.robot.position
-            own = Affine.of_pose(Pose(at.x, at.y, self.robot.yaw))
             if self._seen is not None:
                 place = self.robot.pose_source.common_from_own @ place
-            place = own.inverse @ place
+            at, heading = self.robot.position, self.robot.orientation.yaw
+            place = Affine.into_pose(Pose(at.x, at.y, heading)) @ place
         put(self.svg, place)
         for element, (x, y) in self._upright.items():
             turn = Affine.rotation(-self.robot.yaw - math.atan2(place.b, place.a))
@@ -217,7 +224,9 @@ class Placed:
 
     def _show_trouble(self, found: Sighting) -> None:
         """Show a problem of the pose once; clear it when it ends."""
-        trouble = lasting(self._lasting, found.trouble, self.robot.pose_source.frames)
+        trouble = delayed_problem(
+            self._problem_delay, found.trouble, self.robot.pose_source.frames
+        )
         if trouble == self._trouble:
             return
         self._trouble = trouble

@@ -1,6 +1,6 @@
 """The pose of a message's frame at the time of measurement."""
 
-from dataclasses import dataclass, replace
+import msgspec
 
 from webmap.base.geometry import Pose
 from webmap.core.pose_source import PoseSource
@@ -17,8 +17,7 @@ FLOWING = 1.0
 """Greatest age of the newest pose while poses count as arriving, in seconds."""
 
 
-@dataclass(frozen=True, slots=True)
-class Sighting:
+class Sighting(msgspec.Struct, frozen=True, gc=False):
     """The pose of data, as far as it is known now."""
 
     offset: Transform
@@ -97,8 +96,8 @@ class Sightings:
         mount = self._mount
         if stamp:
             try:
-                found = buffer.lookup(world, source, stamp)
-                ground = _height(buffer, world, base, stamp)
+                found, on = buffer.lookup_carried(world, source, base, stamp)
+                ground = 0.0 if on is None else on.translation.z
                 return Sighting(found @ mount, ground)
             except TransformError:
                 pass  # The poses may be known when the frames are not.
@@ -154,7 +153,7 @@ def _lost(
     """Return the fallback pose of data whose frame is unknown, with the trouble."""
     if placing.quiet:
         return otherwise
-    return replace(
+    return msgspec.structs.replace(
         otherwise,
         settled=False,
         trouble=f"{type(error).__name__} {source}",
@@ -175,14 +174,6 @@ def newest_or_at(
     newest = found.newest
     coming = bool(stamp) and newest is not None and newest < stamp <= newest + SOON
     return found.transform, found.on_time or not coming
-
-
-def _height(buffer: Buffer, target: str, base: str, stamp: float) -> float:
-    """Return the height of the base, in metres; 0 if it is unknown."""
-    try:
-        return newest_or_at(buffer, target, base, stamp)[0].translation.z
-    except TransformError:
-        return 0.0
 
 
 def _ahead(buffer: Buffer, target: str, source: str, stamp: float) -> Transform | None:

@@ -11,7 +11,7 @@ from functools import partial
 from webmap.base.audience import audience
 from webmap.base.errors import ProtocolError
 from webmap.base.scope import Removal, no_scope
-from webmap.poses.lasting import Lasting
+from webmap.poses.placing import ProblemDelay
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import TFMessage
 from webmap.ros.subscriptions import Subscription
@@ -339,18 +339,20 @@ def frames_of(bridge: Bridge, namespace: str = "") -> Frames:
     return _shared_frames[key]
 
 
-def lasting(waits: Lasting, trouble: str, frames: Frames | None = None) -> str:
+def delayed_problem(
+    delay: ProblemDelay, trouble: str, frames: Frames | None = None
+) -> str:
     """Return a trouble once it has lasted, and the empty string before.
 
     Args:
-        waits: The history of the trouble.
+        delay: The history of the trouble.
         trouble: The current kind; empty if there is none.
         frames: The frames of the trouble, if any. Nothing is returned while they may
             still arrive, and their listeners are called when the trouble is due.
 
     """
     now = time.monotonic()
-    due = waits.due(trouble, now, -math.inf if frames is None else frames.complete_from)
+    due = delay.due(trouble, now, -math.inf if frames is None else frames.complete_from)
     if due is None:
         return ""
     if now >= due:

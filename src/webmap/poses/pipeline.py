@@ -9,8 +9,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 from webmap.base.geometry import Pose
-from webmap.poses.lasting import Lasting
-from webmap.poses.placing import CLOCKS, Placing, PoseReading
+from webmap.poses.placing import CLOCKS, Placing, PoseReading, ProblemDelay
 from webmap.ros.tf import Transform
 from webmap.ros.tf.track import Track
 
@@ -99,7 +98,7 @@ class PosePipeline:
         self._by_topic = False
         self._gap = GAP
         self._track = Track("")
-        self._lasting = Lasting()
+        self._problem_delay = ProblemDelay()
         self._found: tuple[str, str | None, str | None] = ("", None, None)
         self.problems: Mapping[str, Problem] = {}
         """All current problems; see :class:`Step`."""
@@ -117,7 +116,7 @@ class PosePipeline:
         self.newest = None
         self._track.clear()
         self.jumps.forget()
-        self._lasting = Lasting()
+        self._problem_delay = ProblemDelay()
         self._found, self.problems = ("", None, None), {}
 
     def step(
@@ -190,7 +189,7 @@ class PosePipeline:
             if placing.kind == CLOCKS or not placing.quiet:
                 kind = placing.kind
         earliest = -math.inf if frames is None else frames.complete_from
-        due = self._lasting.due(kind, now, earliest)
+        due = self._problem_delay.due(kind, now, earliest)
         waits = due is not None and now < due
         found = ("" if waits else kind, fault, self.jumps.problem)
         if found != self._found:

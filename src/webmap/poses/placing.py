@@ -1,15 +1,15 @@
 """Readings of a robot's pose, and their transform to the robot's map."""
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple, TypeAlias
 
+from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.geometry import FARTHEST, Quaternion, Twist, Vector3
-from webmap.ros.messages import OdometryMsg
-from webmap.ros.tf import Transform, TransformError
-
-if TYPE_CHECKING:
-    from webmap.poses.frames import Frames
-    from webmap.ros.views import OdometryView
+from webmap.ros import messages
+from webmap.ros.decoding import convert
+from webmap.ros.names import split_type
+from webmap.ros.tf import Buffer, Transform, TransformError
 
 OTHER_CLOCK = 60.0
 """Seconds between two stamps of one moment beyond which they are from different clocks;
@@ -20,6 +20,62 @@ LATE = 2.0
 
 CLOCKS = "clocks"
 """The kind of problem that poses and frames have different clocks."""
+
+
+OdometryView: TypeAlias = (
+    messages.OdometryMsg
+    | messages.PoseWithCovarianceStampedMsg
+    | messages.PoseStampedMsg
+    | messages.PoseMsg
+    | messages.Pose2DMsg
+)
+"""Views of a pose: with ``place``, ``frame_id`` and ``stamp``."""
+
+# By shape alone, the order matters: types with more fields come first.
+ODOMETRY_VIEWS: dict[str, type[OdometryView]] = {
+    "nav_msgs/Odometry": messages.OdometryMsg,
+    "geometry_msgs/PoseWithCovarianceStamped": messages.PoseWithCovarianceStampedMsg,
+    "geometry_msgs/PoseStamped": messages.PoseStampedMsg,
+    "geometry_msgs/Pose": messages.PoseMsg,
+    "geometry_msgs/Pose2D": messages.Pose2DMsg,
+}
+"""The views of the types that hold a robot's pose, by the name in ROS 1."""
+
+
+def odometry_view(type: str) -> type[OdometryView]:
+    """Return the view of a type that holds a robot's pose, in either dialect.
+
+    Raises:
+        ConfigError: If the type does not hold a robot's pose.
+
+    """
+    view = ODOMETRY_VIEWS.get(str(split_type(type)))
+    if view is None:
+        known = ", ".join(ODOMETRY_VIEWS)
+        raise ConfigError(
+            f"{type!r} has no pose of a robot; these types have one: {known}"
+        )
+    return view
+
+
+def odometry_view_by_shape(message: Mapping[str, Any]) -> type[OdometryView]:
+    """Return the view that fits a plain message of unknown type.
+
+    Raises:
+        ProtocolError: If the message holds no robot's pose.
+
+    """
+    for view in ODOMETRY_VIEWS.values():
+        try:
+            convert(message, view)
+        except ProtocolError:
+            continue
+        return view
+    known = ", ".join(ODOMETRY_VIEWS)
+    raise ProtocolError(
+        f"a message with the fields {', '.join(sorted(message))} "
+        f"has no pose of a robot; these types have one: {known}"
+    )
 
 
 class PoseReading(NamedTuple):
@@ -35,14 +91,14 @@ class PoseReading(NamedTuple):
     """The time of measurement in seconds of the robot's clock; 0 if unknown."""
 
     @classmethod
-    def of(cls, message: "OdometryView") -> "PoseReading":
+    def of(cls, message: OdometryView) -> "PoseReading":
         """Return the pose of a decoded message."""
         place = message.place
         p, q = place.position, place.orientation
         return cls(
             Vector3(p.x, p.y, p.z),
             Quaternion(q.x, q.y, q.z, q.w),
-            message.velocity if isinstance(message, OdometryMsg) else None,
+            message.velocity if isinstance(message, messages.OdometryMsg) else None,
             message.frame_id,
             message.stamp,
         )
@@ -77,7 +133,8 @@ class Placing:
     """Transforms a robot's poses to the frame of its map.
 
     Args:
-        frames: The received frames.
+        buffer: The received frames.
+        namespace: The namespace of their topic; see :meth:`Buffer.name`.
         map_frame: The frame that the robot is drawn in.
         base_frame: The robot's own frame.
         quiet: Whether poses that cannot be transformed are no problem.
@@ -85,10 +142,16 @@ class Placing:
     """
 
     def __init__(
-        self, frames: "Frames", map_frame: str, base_frame: str, *, quiet: bool = False
+        self,
+        buffer: Buffer,
+        namespace: str,
+        map_frame: str,
+        base_frame: str,
+        *,
+        quiet: bool = False,
     ) -> None:
-        self.buffer = frames.buffer
-        self._namespace = frames.namespace
+        self.buffer = buffer
+        self._namespace = namespace
         self.map_frame = self.name(map_frame)
         self.base_frame = self.name(base_frame)
         self.quiet = quiet
@@ -190,3 +253,31 @@ class Placing:
 
     def _set_problem(self, error: TransformError, text: str) -> None:
         self.kind, self.problem = type(error).__name__, text
+
+
+PROBLEM_DELAY = 1.0
+"""Seconds for which trouble must last before it is shown: when a connection opens,
+frames arrive one after another, which is no trouble."""
+
+
+class ProblemDelay:
+    """Determines when trouble has lasted for a while."""
+
+    def __init__(self) -> None:
+        self._since: float | None = None
+
+    def due(self, trouble: str, now: float, earliest: float) -> float | None:
+        """Return when to show the trouble; None if there is none.
+
+        Args:
+            trouble: The current kind; empty if there is none.
+            now: The time of any monotonic clock, in seconds.
+            earliest: The earliest time to show it.
+
+        """
+        if not trouble:
+            self._since = None
+            return None
+        if self._since is None:
+            self._since = now
+        return max(self._since + PROBLEM_DELAY, earliest)

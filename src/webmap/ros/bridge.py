@@ -8,20 +8,20 @@ import asyncio
 import importlib
 import logging
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Self
+from typing import Any
 
 import msgspec
 
 from webmap.base.audience import audience
 from webmap.base.errors import BridgeClosed, BridgeError
 from webmap.base.lifecycle import lifecycle
-from webmap.base.scope import Removal, keep, no_scope
+from webmap.base.scope import Removal, keep
 from webmap.ros.callbacks import Callback, Callbacks
 from webmap.ros.definitions import Definitions
 from webmap.ros.fan_out import FanOut
-from webmap.ros.moving import written_behind
+from webmap.ros.motion_topics import written_behind
 from webmap.ros.names import normalise_topic, normalise_url, same_type, split_type
-from webmap.ros.received import BridgeStats, LinkState, ReceivedMessage
+from webmap.ros.received_message import BridgeStats, LinkState, ReceivedMessage
 from webmap.ros.rosbridge.link import RosbridgeLink
 from webmap.ros.subscriptions import (
     Encoding,
@@ -448,46 +448,3 @@ class Bridge:
 
     def _report(self, error: Exception) -> None:
         self._on_error.call(error)
-
-
-class TemporaryBridge(Bridge):
-    """A bridge for the duration of an ``async with``, such as to examine a robot.
-
-    WebMap's life cycle does not start it.
-    """
-
-    async def __aenter__(self) -> Self:
-        return self
-
-    async def __aexit__(self, *exception: object) -> None:
-        await self.stop()
-
-    async def open(self) -> None:
-        """Open the connection for messages; service calls open another one.
-
-        Raises:
-            BridgeClosed: If the connection cannot be opened.
-
-        """
-        loop = asyncio.get_running_loop()
-        opened: asyncio.Future[None] = loop.create_future()
-
-        def failed(error: Exception) -> None:
-            if not opened.done():
-                opened.set_exception(error)
-
-        def succeeded() -> None:
-            if not opened.done():
-                opened.set_result(None)
-
-        with no_scope():
-            removals = (self.on_open(succeeded), self.on_error(failed))
-        self.start(loop)
-        try:
-            await opened
-        finally:
-            for removal in removals:
-                removal.remove()
-
-    def _enlist(self) -> None:
-        pass

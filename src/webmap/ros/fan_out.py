@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import msgspec
 
 from webmap.ros.offload import Offload
-from webmap.ros.received import ReceivedMessage
+from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.subscriptions import Subscription
 
 

@@ -10,8 +10,14 @@ from dataclasses import replace
 from typing import Any
 
 from webmap.base.errors import ConfigError
-from webmap.ros.conforming import MAX_TEXT, Conformer, Misfit, expectation, seconds
 from webmap.ros.definitions import FLOATS, INTEGERS, TIMES, Definitions, Field, shipped
+from webmap.ros.message_check import (
+    MAX_TEXT,
+    MessageCheck,
+    Misfit,
+    expectation,
+    seconds,
+)
 
 MAX_FIELDS = 400
 """Most fields of one form, over all depths."""
@@ -73,7 +79,7 @@ def checked(
         Misfit: If a value does not fit; its path names the field.
 
     """
-    return Conformer(ros2=ros2).message(fields, given)
+    return MessageCheck(ros2=ros2).message(fields, given)
 
 
 def filled_in(

@@ -16,7 +16,7 @@ from webmap.base.processes import python_command
 from webmap.ros.arrays import dec_hook
 from webmap.ros.decoding import Unreadable, convert
 from webmap.ros.limits import LARGE, MAX_FRAME, TooLarge
-from webmap.ros.received import ReceivedMessage
+from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.worker import (
     LENGTH,
     MAX_MESSAGE,

@@ -14,7 +14,7 @@ from webmap.base.scope import Scope, current_scope
 from webmap.ros.callbacks import Callback
 from webmap.ros.limits import GENERAL, LARGE, TooLarge, check_size, limit_of
 from webmap.ros.names import is_type, same_type
-from webmap.ros.received import ReceivedMessage
+from webmap.ros.received_message import ReceivedMessage
 
 Encoding: TypeAlias = Literal["text", "binary", "raw"]
 

@@ -1,5 +1,5 @@
 """The scene: SVG and HTML elements as a tree in Python that records its changes.
 
-Open ``element`` first; ``fragment`` keeps the changes, and ``svg`` and ``html`` make
+Open ``element`` first; ``node`` keeps the changes, and ``svg`` and ``html`` make
 elements. Nothing here knows a browser, a robot or a map.
 """

@@ -4,6 +4,8 @@ import math
 import time
 from typing import Any, NamedTuple
 
+import msgspec
+
 from webmap.base.errors import SceneError
 from webmap.base.geometry import Affine
 from webmap.scene.node import Parent
@@ -35,7 +37,7 @@ class Dots(NamedTuple):
     """Metres in one unit of ``points``."""
 
 
-class Rays(NamedTuple):
+class Rays(msgspec.Struct, frozen=True, gc=False):
     """Where the rays of a scan hit, to draw a small square at each point."""
 
     ranges: bytes
@@ -59,7 +61,7 @@ class Rays(NamedTuple):
     in metres, yaw in radians."""
 
 
-class Age(NamedTuple):
+class Age(msgspec.Struct, frozen=True, gc=False):
     """When the data of an element was measured, by this process's clock."""
 
     measured: float

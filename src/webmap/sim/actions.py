@@ -53,7 +53,7 @@ class ActionlibServer:
         ):
             graph.advertise(owner, f"{self.topic}/{part}", type_name, node=name)
         graph.subscribe(
-            owner, f"{self.topic}/goal", self._on_goal, f"{kind}SimGoal", node=name
+            owner, f"{self.topic}/goal", self._on_goal, f"{kind}Goal", node=name
         )
         graph.subscribe(
             owner,

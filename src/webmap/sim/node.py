@@ -5,9 +5,9 @@ from functools import partial
 from typing import Any
 
 from webmap.base.geometry import Pose, Twist
+from webmap.ros.rosbridge.server.dialect import Quirks
 from webmap.ros.rosbridge.server.encode import Publication
 from webmap.ros.rosbridge.server.graph import Graph, Respond
-from webmap.ros.rosbridge.server.quirks import Quirks
 from webmap.sim.actions import ActionlibServer, NavigateToPose
 from webmap.sim.feeds import Feeds
 from webmap.sim.feeds.sensors import (

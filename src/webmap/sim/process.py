@@ -62,7 +62,7 @@ async def run_simulator(
         drift: Growth of the odometry error, in metres per metre.
         nan: Whether scans and covariances contain some NaN.
         quirks: ``real``, ``polite``, or one of them with changes; see
-            :func:`webmap.ros.rosbridge.server.quirks.parse_quirks`.
+            :func:`webmap.ros.rosbridge.server.dialect.parse_quirks`.
         wander: Whether robots without commands drive to random places.
         errands: Number of robots that go from station to station on their own, the
             last ones; see :mod:`webmap.sim.navigator`.
@@ -88,10 +88,9 @@ async def run_simulator(
 
     """
     # Slow to import, and not needed to import this module.
-    from webmap.ros.rosbridge.server.dialect import Dialect
+    from webmap.ros.rosbridge.server.dialect import Dialect, dialect_of, parse_quirks
     from webmap.ros.rosbridge.server.encode import Encoder
     from webmap.ros.rosbridge.server.graph import Graph
-    from webmap.ros.rosbridge.server.quirks import dialect_of, parse_quirks
     from webmap.ros.rosbridge.server.rosapi import Rosapi
     from webmap.ros.rosbridge.server.schema import Schema
     from webmap.ros.rosbridge.server.server import RosbridgeServer

@@ -9,8 +9,7 @@ import webmap
 from webmap import Map
 from webmap.core.base_page import PageEntry
 from webmap.core.page import Page
-from webmap.features.alerts.alert_panel import AlertPanel
-from webmap.features.alerts.alerts import MOST, Alerts
+from webmap.features.alerts.alerts import MOST, AlertPanel, Alerts
 
 PACKAGE = Path(webmap.__file__).parent
 

@@ -5,8 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from webmap.features.alerts.alert_watch import LOST, AlertWatch, conditions
-from webmap.features.alerts.alerts import KINDS, Alerts
+from webmap.features.alerts.alerts import KINDS, LOST, Alerts, AlertWatch, conditions
 
 
 def bridge(**changes):

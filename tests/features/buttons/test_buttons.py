@@ -250,7 +250,7 @@ def test_a_running_button_cannot_be_pressed_again(sim, robot):
             first = asyncio.create_task(dock.press(by="Ann"))
             try:
                 await until(lambda: node.calls)
-                assert dock.barred == "already running, started by Ann"
+                assert dock.why_disabled == "already running, started by Ann"
                 assert await dock.press(by="Bea") is False
             finally:
                 go_on.set()

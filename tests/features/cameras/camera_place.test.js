@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { afterEach, describe, test } from "node:test";
 
-import { keep, nextCorner, readKept } from "../../../src/webmap/features/cameras/camera_view.js";
+import { nextCorner, readState, storeState } from "../../../src/webmap/features/cameras/camera_view.js";
 
 const MEANT = { open: false, dock: "side", camera: "", x: 0, y: 0 };
 
@@ -23,13 +23,13 @@ describe("the saved state of the camera panel", () => {
   test("is restored unchanged", () => {
     storage(null);
     const kept = { open: true, dock: "float", camera: "Front", x: 0.25, y: 1 };
-    keep(kept);
-    assert.deepEqual(readKept(), kept);
+    storeState(kept);
+    assert.deepEqual(readState(), kept);
   });
 
   test("has default values without storage", () => {
-    assert.deepEqual(readKept(), MEANT);
-    keep({ ...MEANT, open: true });
+    assert.deepEqual(readState(), MEANT);
+    storeState({ ...MEANT, open: true });
   });
 
   for (const text of [
@@ -45,7 +45,7 @@ describe("the saved state of the camera panel", () => {
   ]) {
     test(`falls back to defaults for ${text || "nothing"}`, () => {
       storage(text);
-      assert.deepEqual(readKept(), MEANT);
+      assert.deepEqual(readState(), MEANT);
     });
   }
 });

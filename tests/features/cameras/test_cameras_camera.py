@@ -12,7 +12,7 @@ from PIL import Image
 
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.core.pictures import pictures
-from webmap.features.cameras.camera import Camera, ShownAnyImageMsg, ShownImageMsg
+from webmap.features.cameras.camera import Camera, JpegAnyImageMsg, JpegImageMsg
 from webmap.ros.messages_image import CompressedImageMsg, ImageMsg, size_of
 
 TOPIC = "/camera/image_raw/compressed"
@@ -317,7 +317,7 @@ def test_a_picture_without_a_size_in_its_header_is_refused(data):
         _ = CompressedImageMsg(data).media_type
 
 
-@pytest.mark.parametrize("view", [ShownImageMsg, ShownAnyImageMsg])
+@pytest.mark.parametrize("view", [JpegImageMsg, JpegAnyImageMsg])
 def test_the_camera_shows_the_digest_of_a_raw_picture(link, robot, view):
     raw = view(
         height=8, width=8, encoding="rgb8", step=24, data=bytes([9, 200, 9]) * 64
@@ -328,5 +328,5 @@ def test_the_camera_shows_the_digest_of_a_raw_picture(link, robot, view):
     camera.on_picture(made)
     red, green, blue = shown(camera).getpixel((4, 4))
     assert max(red, blue) < 40 < 160 < green
-    packed_one = ShownAnyImageMsg(data=a_jpeg())
+    packed_one = JpegAnyImageMsg(data=a_jpeg())
     assert packed_one.digest() is packed_one

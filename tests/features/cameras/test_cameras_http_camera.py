@@ -15,8 +15,8 @@ from webmap.base.errors import ConfigError
 from webmap.base.lifecycle import Lifecycle
 from webmap.base.scope import Scope, current_scope
 from webmap.core.pictures import pictures
-from webmap.features.cameras import http_camera
-from webmap.features.cameras.http_camera import HttpCamera
+from webmap.features.cameras import camera as camera_module
+from webmap.features.cameras.camera import HttpCamera
 from webmap.ros import image_pull
 from webmap.ros.backoff import Backoff
 from webmap.ros.image_address import parse_address
@@ -36,7 +36,7 @@ def run(scenario) -> None:
 
     async def whole():
         robot = Robot("Bob")
-        http_camera.lifecycle.begin(asyncio.get_running_loop())
+        camera_module.lifecycle.begin(asyncio.get_running_loop())
         try:
             async with CameraServer() as server:
                 await scenario(server, robot)
@@ -44,7 +44,7 @@ def run(scenario) -> None:
                 await until(lambda: server.open == 0)
         finally:
             robot.destroy()
-            await http_camera.lifecycle.end()
+            await camera_module.lifecycle.end()
 
     asyncio.run(whole())
 
@@ -52,7 +52,7 @@ def run(scenario) -> None:
 @pytest.fixture(autouse=True)
 def own_process(monkeypatch):
     """Start only the objects that a test made."""
-    monkeypatch.setattr(http_camera, "lifecycle", Lifecycle())
+    monkeypatch.setattr(camera_module, "lifecycle", Lifecycle())
 
 
 @pytest.fixture(autouse=True)
@@ -110,9 +110,9 @@ def test_a_watcher_added_before_the_start_gets_pictures_after_the_start(robot):
             camera = HttpCamera(robot, server.at(STREAM), throttle=0)
             camera.watch(lambda: None)
             for _ in range(2):  # a process may end and start again
-                http_camera.lifecycle.begin(asyncio.get_running_loop())
+                camera_module.lifecycle.begin(asyncio.get_running_loop())
                 await until(lambda last=camera.stamp: camera.stamp != last)
-                await http_camera.lifecycle.end()
+                await camera_module.lifecycle.end()
                 await until(lambda: server.open == 0)
             camera.destroy()
 
@@ -293,7 +293,7 @@ def test_a_new_watcher_restarts_a_camera_that_failed_to_start(monkeypatch):
             raise RuntimeError("not now")
 
         with monkeypatch.context() as patch:
-            patch.setattr(http_camera, "Pull", failing)
+            patch.setattr(camera_module, "Pull", failing)
             with pytest.raises(RuntimeError, match="not now"):
                 camera.watch(lambda: None)
         assert not camera.watched

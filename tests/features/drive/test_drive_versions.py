@@ -14,8 +14,8 @@ from webmap.base.geometry import Twist
 from webmap.discovery import discover
 from webmap.gate.display.client import GateClient
 from webmap.gate.protocol import RobotReport, RobotSpec
-from webmap.ros.bridge import TemporaryBridge
-from webmap.ros.rosbridge.server.quirks import REAL, dialect_of
+from webmap.ros.rosbridge.server.dialect import REAL, dialect_of
+from webmap.ros.temporary_bridge import TemporaryBridge
 
 pytestmark = pytest.mark.slow
 

@@ -30,7 +30,7 @@ def send_transforms(link, *transforms, static=False) -> None:
 
 @pytest.fixture(autouse=True)
 def no_patience(monkeypatch):
-    monkeypatch.setattr("webmap.poses.lasting.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.poses.placing.PROBLEM_DELAY", 0.0)
     monkeypatch.setattr("webmap.poses.frames.GRACE", 0.0)
 
 

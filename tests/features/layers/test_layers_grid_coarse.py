@@ -10,7 +10,7 @@ from test_layers_grid_tiles import CELL, change, count, module, publish  # noqa:
 
 from webmap.base.geometry import Pose
 from webmap.features.layers import grid_tiles as room
-from webmap.features.layers.grid_tiles import MOST, OVERLAP, SIDE, GridTiles, coarser
+from webmap.features.layers.grid_tiles import MOST, OVERLAP, SIDE, GridTiles, downsample
 from webmap.scene import svg
 
 FREE = np.zeros((1100, 1200), np.int8)
@@ -27,7 +27,7 @@ def few(monkeypatch):
 def test_a_square_of_cells_has_its_greatest_value(palette, times):
     low, high = (-128, 128) if palette == "raw" else (-1, 101)
     cells = np.random.default_rng(2).integers(low, high, (45, 61)).astype(np.int8)
-    found = coarser(cells, times, palette)
+    found = downsample(cells, times, palette)
     kind = np.uint8 if palette == "raw" else np.int8
     for row in range(0, 45, times):
         for column in range(0, 61, times):
@@ -78,10 +78,10 @@ def test_a_grid_of_400_million_cells_is_read_in_small_steps(monkeypatch):
 
     def read(cells, times, palette):
         steps.append(cells.size)
-        return coarser(cells, times, palette)
+        return downsample(cells, times, palette)
 
-    monkeypatch.setattr(room, "draw_aside", draw)
-    monkeypatch.setattr(room, "coarser", read)
+    monkeypatch.setattr(room, "draw_in_worker", draw)
+    monkeypatch.setattr(room, "downsample", read)
 
     async def scenario():
         # The system allocates no memory for zeros that are never written.

@@ -31,7 +31,7 @@ def count(monkeypatch):
         await asyncio.sleep(0)
         return [grid_png(piece, palette) for piece in pieces]
 
-    monkeypatch.setattr(room, "draw_aside", draw)
+    monkeypatch.setattr(room, "draw_in_worker", draw)
     return shapes
 
 
@@ -313,7 +313,7 @@ def test_an_older_drawing_never_replaces_a_newer_one(link, module, monkeypatch):
         await go_on.wait()
         return [grid_png(piece, palette) for piece in pieces]
 
-    monkeypatch.setattr(room, "draw_aside", draw)
+    monkeypatch.setattr(room, "draw_in_worker", draw)
 
     async def scenario():
         grids = module()
@@ -366,7 +366,7 @@ def test_the_drawing_ends_with_the_layer(link, module, page, monkeypatch):
         await asyncio.sleep(0)
         return [grid_png(piece, palette) for piece in pieces]
 
-    monkeypatch.setattr(room, "draw_aside", draw)
+    monkeypatch.setattr(room, "draw_in_worker", draw)
 
     async def scenario():
         before = len(pictures)

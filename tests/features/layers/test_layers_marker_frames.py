@@ -10,14 +10,14 @@ from test_layers_markers import CUBE, TEXT, marker
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Affine
-from webmap.features.layers.markers import layer as markers
+from webmap.features.layers import markers
 from webmap.poses.alignment import align_bridge
 from webmap.poses.frames import _shared_frames
 
 
 @pytest.fixture(autouse=True)
 def no_patience(monkeypatch):
-    monkeypatch.setattr("webmap.poses.lasting.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.poses.placing.PROBLEM_DELAY", 0.0)
     monkeypatch.setattr("webmap.poses.frames.GRACE", 0.0)
 
 

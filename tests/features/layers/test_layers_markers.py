@@ -287,8 +287,8 @@ def test_a_marker_with_a_zero_quaternion_is_drawn_unrotated(
 def test_markers_beyond_the_limit_are_left_out_and_counted_in_a_notice(
     map, link, channel, monkeypatch
 ):
-    monkeypatch.setattr("webmap.features.layers.markers.layer.MAX_MARKERS", 10)
-    monkeypatch.setattr("webmap.features.layers.markers.layer.SETTLED", 0.01)
+    monkeypatch.setattr("webmap.features.layers.markers.MAX_MARKERS", 10)
+    monkeypatch.setattr("webmap.features.layers.markers.SETTLED", 0.01)
 
     async def until(check):
         async with asyncio.timeout(10):

@@ -18,14 +18,14 @@ from webmap.base.errors import ConfigError, ProtocolError
 from webmap.core.layer import Layer
 from webmap.features.layers.diagnostics import DiagnosticArrayMsg
 from webmap.features.layers.grid_cells import GridCellsMsg
-from webmap.features.layers.markers.messages import MarkerArrayMsg
+from webmap.features.layers.marker_drawing import MarkerArrayMsg
 from webmap.features.layers.nav_sat_fix import NavSatFixMsg
 from webmap.features.layers.occupancy_grid import OccupancyGridUpdateMsg
 from webmap.features.layers.point_cloud import PointCloud2Msg
 from webmap.features.layers.point_stamped import PointStampedMsg
 from webmap.features.layers.polygon import PolygonStampedMsg
 from webmap.features.layers.pose_array import ParticleCloudMsg, PoseArrayMsg
-from webmap.features.layers.pose_with_covariance import PoseWithCovarianceStampedMsg
+from webmap.features.layers.pose_with_covariance import UncertainPoseStampedMsg
 from webmap.features.layers.range import RangeMsg
 from webmap.ros.messages import OccupancyGridMsg, PathMsg
 from webmap.ros.offload import values
@@ -41,7 +41,7 @@ MESSAGES = {
         "header": header(ros2=True),
         "particles": [{"pose": pose(1, 2), "weight": 1.0}],
     },
-    PoseWithCovarianceStampedMsg: doubtful(pose(1, 2), covariance(1, 1)),
+    UncertainPoseStampedMsg: doubtful(pose(1, 2), covariance(1, 1)),
     PolygonStampedMsg: polygon(FOOT),
     RangeMsg: sonar(1.0),
     PointStampedMsg: point(1, 2),

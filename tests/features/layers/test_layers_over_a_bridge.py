@@ -48,7 +48,7 @@ def test_missing_frames_are_a_problem_some_time_after_the_link_opens(
 ):
     """No frame arrives, so only the passing time triggers the check."""
     monkeypatch.setattr("webmap.poses.frames.GRACE", 0.6)
-    monkeypatch.setattr("webmap.poses.lasting.PATIENCE", 0.1)
+    monkeypatch.setattr("webmap.poses.placing.PROBLEM_DELAY", 0.1)
 
     async def scenario():
         urls, stop = [], asyncio.Event()

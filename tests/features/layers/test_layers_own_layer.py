@@ -20,7 +20,7 @@ from webmap.core.registry import map_modules, robot_modules
 from webmap.discovery import discover
 from webmap.discovery.fleet_toml import fleet_toml
 from webmap.discovery.layers import find_layers
-from webmap.features.view.layer_switches import all_layers
+from webmap.features.view.view import all_layers
 from webmap.fleet.periodic_search import LayerSearch
 from webmap.fleet.robot_options import Candidate
 from webmap.fleet.view_robots import ViewRobots

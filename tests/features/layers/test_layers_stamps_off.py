@@ -30,7 +30,7 @@ WAYS = {"ahead": HOUR, "behind": -HOUR}
 @pytest.fixture(autouse=True)
 def patience(monkeypatch):
     """Allow this process to be delayed for a second without a notice."""
-    monkeypatch.setattr("webmap.poses.lasting.PATIENCE", 60.0)
+    monkeypatch.setattr("webmap.poses.placing.PROBLEM_DELAY", 60.0)
 
 
 def at(frame: str, seconds: float) -> dict:
@@ -61,7 +61,7 @@ def drawn_at(scene: Scene, x: float) -> bool:
 
 @pytest.mark.parametrize("way", WAYS)
 def test_a_scan_an_hour_off_is_drawn_with_one_notice(map, channel, monkeypatch, way):
-    monkeypatch.setattr("webmap.poses.lasting.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.poses.placing.PROBLEM_DELAY", 0.0)
     off = scan(1.5, header=at("laser", NOW + WAYS[way]))
 
     async def scenario(scene: Scene) -> None:

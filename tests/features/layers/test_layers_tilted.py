@@ -24,7 +24,7 @@ POINTS = [[1.0, 0.2, 2.0], [-0.5, 0.1, 1.0], [0.3, -1.5, 3.0], [0.0, 0.3, 5.0]]
 
 @pytest.fixture(autouse=True)
 def no_patience(monkeypatch):
-    monkeypatch.setattr("webmap.poses.lasting.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.poses.placing.PROBLEM_DELAY", 0.0)
     monkeypatch.setattr("webmap.poses.frames.GRACE", 0.0)
 
 

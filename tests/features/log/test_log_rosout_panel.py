@@ -7,7 +7,7 @@ import pytest
 from module_fakes import header
 
 from webmap.base.errors import ConfigError
-from webmap.features.log.rosout_panel import LONGEST, MOST, BridgeLog, log_of
+from webmap.features.log.rosout import LONGEST, MOST, BridgeLog, log_of
 
 ROS1, ROS2 = {"info": 2, "error": 8}, {"info": 20, "error": 40}
 

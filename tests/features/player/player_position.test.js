@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { describe, test } from "node:test";
 import {
   clock,
-  grouped,
+  groupMarks,
   Position,
 } from "../../../src/webmap/features/player/player_position.js";
 
@@ -105,7 +105,7 @@ describe("marks", () => {
   const mark = (at, kind) => ({ at, kind, text: kind });
 
   test("that cover one another are one group with the gravest kind", () => {
-    const groups = grouped([mark(30, "goal"), mark(30.2, "stop"), mark(45, "alarm")], 60, 0.01);
+    const groups = groupMarks([mark(30, "goal"), mark(30.2, "stop"), mark(45, "alarm")], 60, 0.01);
     assert.deepEqual(groups, [
       { at: 30, fraction: 0.5, kind: "stop", text: "0:30.0 goal\n0:30.2 stop" },
       { at: 45, fraction: 0.75, kind: "alarm", text: "0:45.0 alarm" },
@@ -114,10 +114,10 @@ describe("marks", () => {
 
   test("of a large group are counted", () => {
     const marks = Array.from({ length: 9 }, () => mark(1, "alarm"));
-    assert.match(grouped(marks, 60, 0.1)[0].text, /\nand 4 more$/);
+    assert.match(groupMarks(marks, 60, 0.1)[0].text, /\nand 4 more$/);
   });
 
   test("of a recording without a length are at its begin", () => {
-    assert.equal(grouped([mark(0, "goal")], 0, 0.1)[0].fraction, 0);
+    assert.equal(groupMarks([mark(0, "goal")], 0, 0.1)[0].fraction, 0);
   });
 });

@@ -2,13 +2,13 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import {
-  cleaned,
   contains,
-  holds,
+  isLineInside,
   LEAST_AREA,
   longestSide,
   MOST_CORNERS,
   problemOf,
+  withoutRepetitions,
 } from "../../../src/webmap/features/routes/polygon.js";
 import { placed } from "./areas.js";
 
@@ -118,7 +118,7 @@ test("repeated corners are merged, including the first and the last", () => {
     [4, 3],
     [0.002, 0],
   ]);
-  assert.deepEqual(cleaned(pressed), [pressed[0], pressed[1], pressed[3]]);
+  assert.deepEqual(withoutRepetitions(pressed), [pressed[0], pressed[1], pressed[3]]);
 });
 
 test("the direction is that of the first longest side", () => {
@@ -141,10 +141,10 @@ test("points on an edge are inside the area, points in a bay are outside", () =>
 });
 
 test("a line along a side or past a corner is inside the area, a line across a bay is not", () => {
-  assert.ok(holds(ONE_BAY, { x: 2, y: 2 }, { x: 4, y: 2 }));
-  assert.ok(holds(ONE_BAY, { x: 1, y: 1 }, { x: 3, y: 2 }));
-  assert.ok(holds(ONE_BAY, { x: 0, y: 2 }, { x: 6, y: 2 }));
-  assert.ok(!holds(ONE_BAY, { x: 1, y: 3 }, { x: 5, y: 3 }));
-  assert.ok(!holds(ONE_BAY, { x: 2, y: 4 }, { x: 4, y: 4 }));
-  assert.ok(!holds(ONE_BAY, { x: 1, y: 1 }, { x: 7, y: 1 }));
+  assert.ok(isLineInside(ONE_BAY, { x: 2, y: 2 }, { x: 4, y: 2 }));
+  assert.ok(isLineInside(ONE_BAY, { x: 1, y: 1 }, { x: 3, y: 2 }));
+  assert.ok(isLineInside(ONE_BAY, { x: 0, y: 2 }, { x: 6, y: 2 }));
+  assert.ok(!isLineInside(ONE_BAY, { x: 1, y: 3 }, { x: 5, y: 3 }));
+  assert.ok(!isLineInside(ONE_BAY, { x: 2, y: 4 }, { x: 4, y: 4 }));
+  assert.ok(!isLineInside(ONE_BAY, { x: 1, y: 1 }, { x: 7, y: 1 }));
 });

@@ -12,8 +12,14 @@ from PIL import Image
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Affine, LocalPlane
-from webmap.features.tiles.tile_grid import Tile, TileGrid
-from webmap.features.tiles.tile_source import FolderTiles, MBTiles, open_tiles, plain
+from webmap.features.tiles.tile_layer import TileGrid
+from webmap.features.tiles.tile_source import (
+    FolderTiles,
+    MBTiles,
+    Tile,
+    open_tiles,
+    plain,
+)
 
 PLACES = [(50.0, 14.0), (0.0, 179.9999), (-33.9, 18.4), (67.0, -150.0)]
 
@@ -98,16 +104,17 @@ def test_the_zoom_level_has_pixels_of_the_screen_pixel_size():
     grid = TileGrid(LocalPlane(50, 14), range(5, 20), size=256, most=64)
     for z in (14, 17, 19):
         scale = 256 * 2**z / (40_075_016.686 * math.cos(math.radians(50)))
-        assert {tile.z for tile in grid.wanted(view(scale), 800, 600)} == {z}
-        assert {tile.z for tile in grid.wanted(view(1.3 * scale), 800, 600)} == {z}
-    assert {tile.z for tile in grid.wanted(view(1000), 800, 600)} == {19}
+        assert {tile.z for tile in grid.tiles_in_view(view(scale), 800, 600)} == {z}
+        nearer = grid.tiles_in_view(view(1.3 * scale), 800, 600)
+        assert {tile.z for tile in nearer} == {z}
+    assert {tile.z for tile in grid.tiles_in_view(view(1000), 800, 600)} == {19}
 
 
 @pytest.mark.parametrize("turn", [0, 0.7])
 def test_the_wanted_tiles_cover_the_view(turn):
     grid = TileGrid(LocalPlane(50, 14, 40), [17], size=256, most=64)
     seen = view(1.2, 500, -200, turn)
-    tiles = grid.wanted(seen, 800, 600)
+    tiles = grid.tiles_in_view(seen, 800, 600)
     for u in range(0, 801, 50):
         for v in range(0, 601, 50):
             x, y = seen.inverse.apply(u, v)
@@ -123,7 +130,7 @@ def test_the_wanted_tiles_cover_the_view(turn):
 def test_the_number_of_wanted_tiles_is_limited(datum, scale):
     for zooms in ([18], range(10, 19), [0, 1]):
         grid = TileGrid(LocalPlane(*datum), zooms, size=256, most=20)
-        tiles = grid.wanted(view(scale), 800, 600)
+        tiles = grid.tiles_in_view(view(scale), 800, 600)
         assert 1 <= len(tiles) <= 20
         assert len(set(tiles)) == len(tiles)
         for tile in tiles:
@@ -134,8 +141,8 @@ def test_the_number_of_wanted_tiles_is_limited(datum, scale):
 def test_a_small_tile_limit_selects_a_coarser_zoom_level():
     fine = TileGrid(LocalPlane(50, 14), range(10, 19), size=256, most=64)
     few = TileGrid(LocalPlane(50, 14), range(10, 19), size=256, most=6)
-    (z,) = {tile.z for tile in fine.wanted(view(0.5), 800, 600)}
-    assert {tile.z for tile in few.wanted(view(0.5), 800, 600)} <= {z - 1, z - 2}
+    (z,) = {tile.z for tile in fine.tiles_in_view(view(0.5), 800, 600)}
+    assert {tile.z for tile in few.tiles_in_view(view(0.5), 800, 600)} <= {z - 1, z - 2}
 
 
 # Sources of tiles.

@@ -74,7 +74,7 @@ def odometry(x, y=0.0, yaw=0.0, *, stamp=10.0, frame="odom"):
 
 @pytest.fixture(autouse=True)
 def no_patience(monkeypatch):
-    monkeypatch.setattr("webmap.poses.lasting.PATIENCE", 0.0)
+    monkeypatch.setattr("webmap.poses.placing.PROBLEM_DELAY", 0.0)
     monkeypatch.setattr("webmap.poses.frames.GRACE", 0.0)
 
 

@@ -8,7 +8,7 @@ from test_tf_robot import Link, odometry, transform
 
 from webmap import Robot
 from webmap.base.geometry import Quaternion, Vector3
-from webmap.poses.frames import FrameFaults, Lasting, lasting
+from webmap.poses.frames import FrameFaults, ProblemDelay, delayed_problem
 from webmap.poses.pipeline import Jumps
 from webmap.poses.placing import PoseReading
 from webmap.ros.tf import Buffer
@@ -267,11 +267,11 @@ def test_a_fault_of_a_frame_with_the_robots_prefix_concerns_the_robot():
 
 
 def test_only_lasting_problems_are_reported(clock):
-    waits = Lasting()
+    waits = ProblemDelay()
     for _ in range(10):
-        assert lasting(waits, "late") == ""
+        assert delayed_problem(waits, "late") == ""
         clock.now += 0.6
-        assert lasting(waits, "") == ""
-    assert lasting(waits, "late") == ""
+        assert delayed_problem(waits, "") == ""
+    assert delayed_problem(waits, "late") == ""
     clock.now += 1.0
-    assert lasting(waits, "late") == "late"
+    assert delayed_problem(waits, "late") == "late"

@@ -16,7 +16,7 @@ from wire_picture import histories, picture_of, play
 
 from webmap.base.geometry import Affine
 from webmap.scene import html, node, svg
-from webmap.scene.bound import Document
+from webmap.scene.document import Document
 from webmap.scene.node import Fragment
 from webmap.scene.wire.session import SceneSession
 

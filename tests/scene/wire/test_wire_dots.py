@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from test_wire_browser_reads import Decoder
 from test_wire_rays import look, rays, room
 
@@ -225,8 +226,8 @@ def test_dots_whose_place_is_not_known_are_sent(decoder, where):
 def test_the_reach_contains_all_dots():
     for scan in (
         SCAN,
-        SCAN._replace(place=Affine(0, 1, -1, 0, 3.0, -4.0)),
-        SCAN._replace(moved=(0.5, 0.3, 1.0)),
+        replace(SCAN, place=Affine(0, 1, -1, 0, 3.0, -4.0)),
+        replace(SCAN, moved=(0.5, 0.3, 1.0)),
     ):
         from equipment.ray_points import points_of
 

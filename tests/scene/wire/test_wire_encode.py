@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from webmap.base.geometry import Affine
 from webmap.scene import html, svg
 from webmap.scene.allowed import ATTRIBUTES
-from webmap.scene.bound import Document
+from webmap.scene.document import Document
 from webmap.scene.node import Fragment
 from webmap.scene.wire.dots import PageDots
 from webmap.scene.wire.encode import (

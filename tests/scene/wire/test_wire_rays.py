@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from msgspec.structs import replace
 from test_wire_browser_reads import Decoder
 
 from equipment.ray_points import points_of
@@ -103,7 +104,7 @@ def test_dots_are_where_the_rays_hit(decoder, name):
     scan = CASES[name]
     reach = np.frombuffer(scan.ranges, "<f4")
     hits = np.where(np.isfinite(reach) & (reach >= 0), reach, np.nan).astype("<f4")
-    expected = points_of(scan._replace(ranges=hits.tobytes()))
+    expected = points_of(replace(scan, ranges=hits.tobytes()))
     found = drawn(decoder, shown(scan)[3])
     near = 0.03 if name == "far" else 0.0013
     assert len(found) == len(expected)
@@ -251,11 +252,11 @@ def test_dots_follow_their_element_into_another_fragment(decoder):
 def test_rays_need_a_path_whole_distances_and_finite_numbers():
     path = svg.path()
     for wrong, why in [
-        (rays([1.0])._replace(ranges=b"123"), "4 bytes each"),
-        (rays([1.0, 2.0])._replace(total=1), "got 8 bytes for 1 rays"),
-        (rays([1.0])._replace(first=math.nan), "must be finite"),
-        (rays([1.0])._replace(place=Affine(e=math.inf)), "must be finite"),
-        (rays([1.0])._replace(moved=(0.0, math.inf, 0.0)), "must be finite"),
+        (replace(rays([1.0]), ranges=b"123"), "4 bytes each"),
+        (replace(rays([1.0, 2.0]), total=1), "got 8 bytes for 1 rays"),
+        (replace(rays([1.0]), first=math.nan), "must be finite"),
+        (replace(rays([1.0]), place=Affine(e=math.inf)), "must be finite"),
+        (replace(rays([1.0]), moved=(0.0, math.inf, 0.0)), "must be finite"),
     ]:
         with pytest.raises(SceneError, match=why):
             path.set_rays(wrong)

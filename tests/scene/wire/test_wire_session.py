@@ -6,7 +6,7 @@ import pytest
 
 from webmap.base.errors import WireError
 from webmap.scene import html, svg
-from webmap.scene.bound import Document
+from webmap.scene.document import Document
 from webmap.scene.node import Fragment
 from webmap.scene.wire.messages import ElementEvent, ModuleMessage, ViewReport
 from webmap.scene.wire.opcodes import RESET, VERSION

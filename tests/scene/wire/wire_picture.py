@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from webmap.base.geometry import Affine
 from webmap.scene import html, svg
-from webmap.scene.bound import BoundElement
+from webmap.scene.document import BoundElement
 from webmap.scene.node import Fragment, Text
 from webmap.scene.wire.page_state import flags
 

@@ -11,7 +11,7 @@ from webmap.discovery.doctor.facts import (
     Measurement,
 )
 from webmap.discovery.doctor.verdict import is_ready, judge
-from webmap.ros.finding import Finding
+from webmap.ros.rosbridge.advice import Finding
 
 __all__ = [
     "BridgeFacts",

@@ -27,12 +27,12 @@ from webmap.discovery.doctor.topic_rules import shown_topics
 from webmap.discovery.findings import Findings, FoundRobot
 from webmap.discovery.frames import FrameCollector, frame_topics
 from webmap.discovery.robots import discover, host_name
-from webmap.ros.asking import ask_topics
-from webmap.ros.bridge import Bridge, TemporaryBridge
+from webmap.ros.bridge import Bridge
 from webmap.ros.names import is_agent_url, is_type
-from webmap.ros.received import ReceivedMessage
+from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.rosbridge import checks
 from webmap.ros.subscriptions import Encoding
+from webmap.ros.temporary_bridge import TemporaryBridge, ask_topics
 
 PATIENCE = 3.0
 """Seconds for an answer; if a bridge takes longer, it gets no more requests."""

@@ -9,9 +9,9 @@ from webmap.discovery.doctor.topic_rules import (
     shown_findings,
 )
 from webmap.discovery.findings import FoundRobot, Guess
-from webmap.ros.finding import Finding
 from webmap.ros.names import is_agent_url, is_type, same_type
 from webmap.ros.rosbridge import advice
+from webmap.ros.rosbridge.advice import Finding
 from webmap.ros.rosbridge.graph import is_client_node
 
 MOST_ODDITIES = 3

@@ -14,7 +14,7 @@ from webmap.discovery.doctor.facts import Measurement
 from webmap.discovery.tf_robots import MAP
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import Header, TFMessage
-from webmap.ros.received import ReceivedMessage
+from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.subscriptions import Encoding
 from webmap.ros.tf import Buffer, Transform, TransformError
 

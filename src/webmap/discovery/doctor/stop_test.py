@@ -23,8 +23,8 @@ from webmap.discovery.robots import host_name
 from webmap.gate.display.client import GateClient
 from webmap.gate.protocol import RobotSpec
 from webmap.gate.rules.stop_test import MOVES_ON
-from webmap.ros.asking import ask_topics
 from webmap.ros.names import normalise_url
+from webmap.ros.temporary_bridge import ask_topics
 
 PERIOD = 0.05
 """Seconds between two answers to the gate."""

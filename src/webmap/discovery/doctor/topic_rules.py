@@ -6,8 +6,8 @@ from dataclasses import replace
 from webmap.base.text import counted
 from webmap.discovery.doctor.facts import BridgeFacts, Measurement
 from webmap.discovery.findings import FoundRobot, Guess, TopicRole
-from webmap.ros.finding import Finding, Level
 from webmap.ros.rosbridge import advice
+from webmap.ros.rosbridge.advice import Finding, Level
 
 OLD = 1.0
 """Seconds after which a pose is too old for driving."""

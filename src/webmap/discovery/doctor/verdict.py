@@ -7,10 +7,9 @@ from urllib.parse import urlsplit
 from webmap.base.text import one_line
 from webmap.discovery.doctor.facts import MOST_ROBOTS, BridgeFacts, Clock
 from webmap.discovery.doctor.robot_rules import robot_findings
-from webmap.ros.finding import BRIDGE, LEVELS, Finding, Level
 from webmap.ros.names import agent_named, is_agent_url
 from webmap.ros.rosbridge import advice
-from webmap.ros.rosbridge.advice import listen_advice
+from webmap.ros.rosbridge.advice import BRIDGE, LEVELS, Finding, Level, listen_advice
 from webmap.ros.rosbridge.checks import is_loopback
 
 MARKS = {"wrong": "WRONG", "warning": "warning", "note": "note", "good": "good"}

@@ -1,5 +1,4 @@
 """Alerts: what needs a person, in one list that all viewers share.
 
-Open ``alerts.py`` for the list, ``alert_watch.py`` for what makes an alert,
-``alert_panel.py`` for the panel of a page.
+Open ``alerts.py`` first: it has the list, what makes an alert, and the panel of a page.
 """

@@ -41,7 +41,7 @@ export class Pace {
 /** The two signals, with a switch for each. */
 export class Signals {
   constructor() {
-    const { sound, notify } = kept();
+    const { sound, notify } = readChoice();
     /** @type {AudioContext | null} null until a press: browsers refuse it before. */
     this._audio = null;
     this._sound = html("input", "", { type: "checkbox" });
@@ -162,7 +162,7 @@ function beep(audio) {
 }
 
 /** @returns {{sound: boolean, notify: boolean}} */
-function kept() {
+function readChoice() {
   try {
     const { sound, notify } = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
     return { sound: sound !== false, notify: notify === true };

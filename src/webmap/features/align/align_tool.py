@@ -66,12 +66,12 @@ class AlignTool:
 
     def _begin(self, id: str) -> None:
         robot = self.map.find_robot(id)
-        why = self._barred(robot)
+        why = self._why_refused(robot)
         if robot is None or why is not None:
             self.browser_part.send({"refused": why})
             return
         bridge = robot.pose_source.bridge
-        assert bridge is not None  # else it is barred
+        assert bridge is not None  # else it is refused
         together = [r.id for r in self._together(robot)]
         self.browser_part.send(
             {
@@ -92,11 +92,11 @@ class AlignTool:
         robot = self.map.find_robot(wanted.get("robot"))
         pose = alignment(*(wanted.get(key) for key in ("x", "y", "angle")))  # type: ignore[arg-type]
         whole = wanted.get("whole") is True
-        why = self._barred(robot, whole=whole)
+        why = self._why_refused(robot, whole=whole)
         if robot is None or why is not None:
             raise ConfigError(why or "The robot is no longer on this map.")
         bridge = robot.pose_source.bridge
-        assert bridge is not None  # else it is barred
+        assert bridge is not None  # else it is refused
         before: Pose | None
         if whole:
             name, before = name_of(bridge), alignments.stated(bridge)
@@ -121,7 +121,7 @@ class AlignTool:
             lost = ""
         self.browser_part.send({"saved": {"line": toml_line(pose), "lost": lost}})
 
-    def _barred(self, robot: "Robot | None", *, whole: bool = False) -> str | None:
+    def _why_refused(self, robot: "Robot | None", *, whole: bool = False) -> str | None:
         """Return why a robot cannot be aligned from this page now, None if it can."""
         if self.map.page.viewer.role not in MAY_ALIGN:
             return "Only operators can align maps."

@@ -14,8 +14,8 @@ from webmap.core.base_page import page_of
 from webmap.core.registry import robot_modules
 from webmap.features.buttons.robot_button import RobotButton, declared_motion, values_of
 from webmap.ros.bridge import Bridge
-from webmap.ros.conforming import Misfit
 from webmap.ros.definitions import FLOATS, INTEGERS, TIMES, Field, UnknownType
+from webmap.ros.message_check import Misfit
 from webmap.ros.message_forms import entry_of, filled_in, hint, initial, leaves
 from webmap.scene import html
 from webmap.scene.element import Element, Event
@@ -72,7 +72,7 @@ class ButtonView:
         """Show the state of the button."""
         button = self.button
         running = button.state == "running"
-        why = self._barred()
+        why = self._why_disabled()
         self.element.set("data-state", button.state)
         self._press.set(disabled=why is not None)
         self._press.set(title=None if why is None else f"Not available: {why}")
@@ -85,13 +85,13 @@ class ButtonView:
             )
         self._result.text = _result_text(button, why)
 
-    def _barred(self) -> str | None:
+    def _why_disabled(self) -> str | None:
         if self._viewer.role not in MAY_PRESS:
             return "only operators can press this button"
-        return self.button.barred
+        return self.button.why_disabled
 
     async def _pressed(self, event: Event) -> None:
-        if self._barred() is not None:
+        if self._why_disabled() is not None:
             return
         if self.button.spec.form:
             self._open_form()
@@ -119,7 +119,7 @@ class ButtonView:
 
     async def _run(self, values: Any) -> None:
         # Only a current operator may press, whatever the page sends.
-        if self._barred() is None:
+        if self._why_disabled() is None:
             self._close(self._sheet)
             # The press belongs to the robot: it continues when the page shows another
             # robot.
@@ -154,7 +154,7 @@ class ButtonView:
         return html.div(no, go, class_="answers")
 
     async def _ask_robot(self, event: Event) -> None:
-        if self._barred() is not None:
+        if self._why_disabled() is not None:
             return
         try:
             await self.button.ask_fields()

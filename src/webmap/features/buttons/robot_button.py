@@ -56,7 +56,7 @@ class RobotButton:
         return f"<RobotButton {self.spec.label!r} of {self.robot.name!r} {self.state}>"
 
     @property
-    def barred(self) -> str | None:
+    def why_disabled(self) -> str | None:
         """Why the button cannot be pressed now, as text; None if it can."""
         if self.state == "running":
             return f"already running, started by {self.by}"
@@ -88,7 +88,7 @@ class RobotButton:
                 configuration if not given.
             by: Who presses, for people and for the log.
         """
-        why = self.barred
+        why = self.why_disabled
         if why is not None:
             if self.state != "running":
                 self._become("failed", f"Not done: {why}", by)
@@ -99,7 +99,7 @@ class RobotButton:
             if values is None:
                 values = self._configured()
             words = await run(self._bridge, self.spec, values)
-        except NotDone as error:
+        except ButtonFailed as error:
             words = f"Failed: {error}"
             log.warning("%s: %s: %s", self.robot.name, self.spec.label, words)
             self._become("failed", words, by)
@@ -170,7 +170,7 @@ def _field_of_value(value: Any) -> Field:
     raise AssertionError("a form of a parameter has one value")
 
 
-class NotDone(WebMapError):
+class ButtonFailed(WebMapError):
     """A button's action failed; the text explains the reason to people."""
 
 
@@ -205,7 +205,7 @@ async def run(bridge: Bridge, spec: ButtonSpec, values: Any) -> str:
         The result, as text.
 
     Raises:
-        NotDone: If the action failed, was refused, or was not answered in time.
+        ButtonFailed: If the action failed, was refused, or was not answered in time.
     """
     try:
         await _refuse_motion(bridge, spec)
@@ -217,12 +217,12 @@ async def run(bridge: Bridge, spec: ButtonSpec, values: Any) -> str:
         if spec.node is None:
             return await _set_ros1(bridge, spec, values)
         return await _set_ros2(bridge, spec, values)
-    except NotDone:
+    except ButtonFailed:
         raise
     except MotionRefused as error:
-        raise NotDone(f"refused: {error}") from None
+        raise ButtonFailed(f"refused: {error}") from None
     except (WebMapError, ValueError, TypeError) as error:
-        raise NotDone(shortened(str(error))) from None
+        raise ButtonFailed(short_text(str(error))) from None
 
 
 async def _refuse_motion(bridge: Bridge, spec: ButtonSpec) -> None:
@@ -230,7 +230,7 @@ async def _refuse_motion(bridge: Bridge, spec: ButtonSpec) -> None:
 
     Raises:
         MotionRefused: If it would move a robot.
-        NotDone: If the robot's type differs from the configured type.
+        ButtonFailed: If the robot's type differs from the configured type.
     """
     found = await _type_on_robot(bridge, spec)
     for type in (spec.type, found):
@@ -241,7 +241,7 @@ async def _refuse_motion(bridge: Bridge, spec: ButtonSpec) -> None:
     if why is not None:
         raise MotionRefused(why)
     if found and spec.type and not same_type(found, spec.type):
-        raise NotDone(f"{spec.name} is of type {found}, not of {spec.type}")
+        raise ButtonFailed(f"{spec.name} is of type {found}, not of {spec.type}")
 
 
 async def _type_on_robot(bridge: Bridge, spec: ButtonSpec) -> str | None:
@@ -256,17 +256,18 @@ async def _call(bridge: Bridge, spec: ButtonSpec, values: Mapping[str, Any]) -> 
     answer = await bridge.call_service(
         spec.name, values, type=spec.type, timeout=spec.timeout
     )
-    return answered(answer)
+    return answer_text(answer)
 
 
 async def _set_ros1(bridge: Bridge, spec: ButtonSpec, value: Any) -> str:
     name = spec.name
     now = await bridge.set_parameter(name, value, timeout=spec.timeout)
     if now != value:
-        raise NotDone(
-            f"got {shown(now)} for {name} from the robot, expected {shown(value)}"
+        raise ButtonFailed(
+            f"got {value_text(now)} for {name} from the robot, expected "
+            f"{value_text(value)}"
         )
-    return f"{name} is {shown(value)}"
+    return f"{name} is {value_text(value)}"
 
 
 async def _set_ros2(bridge: Bridge, spec: ButtonSpec, value: Any) -> str:
@@ -284,29 +285,31 @@ async def _set_ros2(bridge: Bridge, spec: ButtonSpec, value: Any) -> str:
         raise ServiceError(f"{spec.node}/set_parameters gave no usable answer")
     if first["successful"] is not True:
         reason = str(first.get("reason") or "no reason was given")
-        raise NotDone(shortened(f"{spec.node} refused: {reason}"))
-    return f"{spec.name} is {shown(value)}"
+        raise ButtonFailed(short_text(f"{spec.node} refused: {reason}"))
+    return f"{spec.name} is {value_text(value)}"
 
 
-def answered(answer: Any) -> str:
+def answer_text(answer: Any) -> str:
     """Return a service's answer as text.
 
     Raises:
-        NotDone: If the answer has ``success: false``.
+        ButtonFailed: If the answer has ``success: false``.
     """
     if not isinstance(answer, Mapping):
         return "Done"
     message = str(answer.get("message") or answer.get("status_message") or "")
     if answer.get("success") is False:
-        raise NotDone(shortened(message or "the robot reports no success"))
+        raise ButtonFailed(short_text(message or "the robot reports no success"))
     if message:
-        return shortened(f"Done: {message}")
+        return short_text(f"Done: {message}")
     rest = {name: value for name, value in answer.items() if name != "success"}
-    words = ", ".join(f"{name} {shown(value)}" for name, value in rest.items() if value)
-    return shortened(f"Done: {words}") if words else "Done"
+    words = ", ".join(
+        f"{name} {value_text(value)}" for name, value in rest.items() if value
+    )
+    return short_text(f"Done: {words}") if words else "Done"
 
 
-def shown(value: Any) -> str:
+def value_text(value: Any) -> str:
     """Return a value as text."""
     if value is None:
         return "nothing"
@@ -315,7 +318,7 @@ def shown(value: Any) -> str:
     return json.dumps(value, ensure_ascii=False, default=str)
 
 
-def shortened(text: str) -> str:
+def short_text(text: str) -> str:
     """Return a text without unprintable characters, cut to ``MAX_TEXT``."""
     plain = "".join(c if c.isprintable() else " " for c in text)
     return plain if len(plain) <= MAX_TEXT else f"{plain[: MAX_TEXT - 3]}..."

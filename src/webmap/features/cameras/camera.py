@@ -1,24 +1,145 @@
-"""A camera of a robot."""
+"""The cameras of a robot: pictures from a topic or over HTTP, for pages that watch."""
 
 import asyncio
 import io
 import re
+import time
+from collections import deque
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import msgspec
 
+from webmap.agents.remote_camera import RemoteCamera, RemoteCameraPull
 from webmap.base.errors import ConfigError, ProtocolError
-from webmap.base.scope import Scope, no_scope
+from webmap.base.lifecycle import lifecycle
+from webmap.base.scope import Removable, Removal, Scope, current_scope, keep, no_scope
 from webmap.base.tasks import spawn
+from webmap.core.pictures import pictures
 from webmap.core.problems import draw_or_report
 from webmap.core.registry import robot_modules
-from webmap.features.cameras.camera_feed import CameraFeed
 from webmap.ros.bridge import Bridge
+from webmap.ros.image_address import parse_address
+from webmap.ros.image_pull import Pull
 from webmap.ros.messages_image import AnyImageMsg, CompressedImageMsg, ImageMsg
-from webmap.ros.names import split_type
+from webmap.ros.names import is_agent_url, split_type
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
+
+AGE_LIMIT = 1.0
+"""Seconds after which a picture is stale."""
+
+LEAST_KEPT, MOST_KEPT = 3, 64
+"""Pictures that pages may request: slow pages still request earlier ones."""
+
+KEPT_FOR = 5.0
+"""Seconds for which pictures beyond the least number are kept."""
+
+KEPT_BYTES = 8 << 20
+"""Greatest number of bytes of the pictures beyond the least number."""
+
+
+class CameraFeed:
+    """The newest picture of one camera, and the pages that watch it.
+
+    A derived class starts and stops its pictures in ``begin`` and ``end``, and passes
+    each to :meth:`show`. Pictures arrive only while a page watches, and once for all
+    pages.
+
+    Args:
+        robot: The robot that carries the camera.
+        name: The camera's name, for people.
+    """
+
+    def __init__(self, robot: "Robot", name: str) -> None:
+        self.robot = robot
+        self.name = name
+        self.url: str | None = None
+        """The URL of the newest picture; None until there is one."""
+        self.stamp: float | None = None
+        """Time when the picture was sent, in monotonic seconds."""
+        self._watchers: dict[object, Callable[[], None]] = {}
+        self._kept: deque[tuple[str, float, int]] = deque()
+
+    def begin(self) -> None:
+        """Start the pictures: a page watches now."""
+        raise NotImplementedError
+
+    def end(self) -> None:
+        """Stop the pictures: no page watches any more."""
+        raise NotImplementedError
+
+    def destroy(self) -> None:
+        """Remove the pictures."""
+        if self._watchers:
+            self._watchers.clear()
+            self._finish()
+
+    @property
+    def watched(self) -> bool:
+        """Whether a page watches, so that pictures arrive."""
+        return bool(self._watchers)
+
+    def watch(self, fn: Callable[[], None]) -> Removable:
+        """Call ``fn`` whenever there is a new picture.
+
+        Returns:
+            A handle that ends the calls; the end of the current scope ends them too.
+        """
+        key = object()
+        first = not self._watchers
+        self._watchers[key] = fn
+        if first:
+            # Outside the scope of the first watcher, because the pictures continue for
+            # others.
+            try:
+                with no_scope():
+                    self.begin()
+            except BaseException:
+                # The next watcher is the first again, and begins.
+                self._watchers.pop(key, None)
+                raise
+        scope = current_scope()
+
+        def undo() -> None:
+            if scope is not None:
+                scope.discard(watching)
+            if self._watchers.pop(key, None) is not None and not self._watchers:
+                self._finish()
+
+        watching = keep(Removal(undo))
+        return watching
+
+    def show(self, data: bytes, media_type: str, lag: float = 0.0) -> None:
+        """Show a picture to all watchers, in place of the last one.
+
+        Args:
+            data: The picture.
+            media_type: Its type, as in ``image/jpeg``.
+            lag: Seconds between sending and receiving.
+        """
+        # Pictures must not remain on an operator's disk.
+        self.url = pictures.publish(data, media_type, fleeting=True)
+        now = time.monotonic()
+        self.stamp = now - lag
+        kept = self._kept
+        kept.append((self.url, now, len(data)))
+        while len(kept) > LEAST_KEPT and (
+            len(kept) > MOST_KEPT
+            or now - kept[0][1] > KEPT_FOR
+            or sum(size for _, _, size in kept) > KEPT_BYTES
+        ):
+            pictures.withdraw(kept.popleft()[0])
+        for fn in tuple(self._watchers.values()):
+            fn()
+
+    def _finish(self) -> None:
+        self.end()
+        self.robot.clear_problem(self)
+        while self._kept:
+            pictures.retire(self._kept.popleft()[0])
+        self.url = self.stamp = None
 
 
 CameraType: TypeAlias = Literal[
@@ -31,11 +152,11 @@ CameraType: TypeAlias = Literal[
 
 PACKED, RAW = "sensor_msgs/CompressedImage", "sensor_msgs/Image"
 
-DRAWN = "jpeg"
+JPEG = "jpeg"
 """The encoding of a large raw picture after the worker process has drawn it."""
 
 
-class ShownImageMsg(ImageMsg):
+class JpegImageMsg(ImageMsg):
     """A raw picture that is converted to JPEG if it is large."""
 
     def digest(self) -> ImageMsg:
@@ -44,10 +165,10 @@ class ShownImageMsg(ImageMsg):
         Raises:
             ProtocolError: If its encoding or its size is not supported.
         """
-        return msgspec.structs.replace(self, encoding=DRAWN, data=jpeg(self))
+        return msgspec.structs.replace(self, encoding=JPEG, data=jpeg(self))
 
 
-class ShownAnyImageMsg(AnyImageMsg):
+class JpegAnyImageMsg(AnyImageMsg):
     """A picture of either type; a large raw picture is converted to JPEG."""
 
     def digest(self) -> AnyImageMsg:
@@ -58,13 +179,13 @@ class ShownAnyImageMsg(AnyImageMsg):
         """
         if self.raw is None:
             return self
-        return msgspec.structs.replace(self, encoding=DRAWN, data=jpeg(self.raw))
+        return msgspec.structs.replace(self, encoding=JPEG, data=jpeg(self.raw))
 
 
 VIEWS: dict[str | None, type[msgspec.Struct]] = {
     PACKED: CompressedImageMsg,
-    RAW: ShownImageMsg,
-    None: ShownAnyImageMsg,
+    RAW: JpegImageMsg,
+    None: JpegAnyImageMsg,
 }
 
 PLAIN = re.compile(r"/image(?![^/]*(?:compress|jpe?g|png|webp))[^/]*\Z")
@@ -113,7 +234,7 @@ class Camera(CameraFeed):
         self._throttle = throttle
         self._scope: Scope | None = None
         self._drawing: asyncio.Task[None] | None = None
-        self._undrawn: ImageMsg | None = None
+        self._waiting: ImageMsg | None = None
 
     def begin(self) -> None:
         """Subscribe to the pictures."""
@@ -135,7 +256,7 @@ class Camera(CameraFeed):
         scope, self._scope = self._scope, None
         if scope is not None:
             scope.close()
-        self._undrawn = None
+        self._waiting = None
 
     def _report(self, text: str, about: object) -> None:
         if about is None:
@@ -170,17 +291,17 @@ class Camera(CameraFeed):
         Raises:
             ProtocolError: If its encoding or its size is not supported.
         """
-        if image.encoding == DRAWN:
+        if image.encoding == JPEG:
             self.show(image.data, "image/jpeg", self._bridge.lag)
             return
-        self._undrawn = image
+        self._waiting = image
         if self._drawing is None:
             self._drawing = spawn(self._draw())
 
     async def _draw(self) -> None:
         try:
-            while (image := self._undrawn) is not None:
-                self._undrawn = None
+            while (image := self._waiting) is not None:
+                self._waiting = None
                 try:
                     data = await asyncio.to_thread(jpeg, image)
                 except ProtocolError as error:
@@ -211,3 +332,75 @@ def jpeg(image: ImageMsg) -> bytes:
     file = io.BytesIO()
     Image.fromarray(image.pixels()).save(file, "JPEG", quality=75)
     return file.getvalue()
+
+
+@robot_modules.register
+class HttpCamera(CameraFeed):
+    """Loads the pictures of a camera over HTTP, once for all pages that watch.
+
+    Pages get the pictures from WebMap and never receive the camera's address. The
+    camera's response decides between a stream and a single picture.
+
+    Args:
+        robot: The robot that carries the camera.
+        address: ``http://`` or ``https://``: a ``multipart/x-mixed-replace`` stream,
+            such as ``/stream`` of ``web_video_server``, or a single picture that is
+            requested repeatedly, such as ``/snapshot``. For a robot of an agent, the
+            camera as the agent names it: the agent loads its pictures.
+        name: The camera's name, for people.
+        throttle: The least time between two pictures, in milliseconds.
+
+    Raises:
+        ConfigError: If the address or the time is not valid.
+    """
+
+    def __init__(
+        self,
+        robot: "Robot",
+        address: str,
+        name: str = "Camera",
+        throttle: int = 200,
+    ) -> None:
+        super().__init__(robot, name)
+        if not isinstance(throttle, int) or throttle < 0:
+            raise ConfigError(
+                f"the throttle of a camera is in milliseconds, 0 or more, got "
+                f"{throttle!r}"
+            )
+        far = isinstance(address, str) and is_agent_url(address)
+        self._address = RemoteCamera.parse(address) if far else parse_address(address)
+        self._throttle = throttle
+        self._pull: Pull | RemoteCameraPull | None = None
+
+    @property
+    def address(self) -> str:
+        """The camera's address, without possible secrets."""
+        return self._address.shown
+
+    def begin(self) -> None:
+        """Connect to the camera as soon as the process runs."""
+        address, seconds = self._address, self._throttle / 1000
+        if isinstance(address, RemoteCamera):
+            self._pull = RemoteCameraPull(address, self._show, self._complain)
+        else:
+            self._pull = Pull(address, seconds, self._show, self._complain)
+        lifecycle.add(self._pull)
+
+    def end(self) -> None:
+        """Disconnect."""
+        if self._pull is not None:
+            lifecycle.discard(self._pull)
+            self._pull.hang_up()
+            self._pull = None
+
+    def _show(self, data: bytes, age: float = 0.0) -> None:
+        try:
+            media_type = CompressedImageMsg(data).media_type
+        except ProtocolError as error:
+            self._complain(f"it sends {error}")
+            return
+        self.robot.clear_problem(self)
+        self.show(data, media_type, age)
+
+    def _complain(self, text: str) -> None:
+        self.robot.set_problem(self, f"{self.name} at {self.address}: {text}")

@@ -1,11 +1,11 @@
 import {
   CameraView,
-  FOUND,
-  keep,
+  DEFAULTS,
   listenToDrags,
   nextCorner,
-  readKept,
+  readState,
   roomFor,
+  storeState,
 } from "./camera_view.js";
 import { resolve } from "../../web/access.js";
 import { closeSheet } from "../../web/tools/elements.js";
@@ -48,7 +48,7 @@ class CameraPanel {
   constructor(map, send) {
     this._map = map;
     this._send = send;
-    this._kept = readKept();
+    this._kept = readState();
     /** @type {Cameras} */
     this._there = { op: "cameras", robot: "", name: "", cameras: [] };
     /** @type {Camera | null} */
@@ -81,7 +81,7 @@ class CameraPanel {
     this._leave = map.layout.add("camera", {
       read: () => ({ dock: this._kept.dock, x: this._kept.x, y: this._kept.y }),
       write: (place) => this._move(place),
-      reset: () => this._move(FOUND),
+      reset: () => this._move(DEFAULTS),
     });
     this._show();
   }
@@ -127,7 +127,7 @@ class CameraPanel {
     const camera = this._there.cameras.find((one) => one.id === id);
     if (!camera) return;
     Object.assign(this._kept, { open: true, camera: camera.name });
-    keep(this._kept);
+    storeState(this._kept);
     this._use(camera);
   }
 
@@ -147,7 +147,7 @@ class CameraPanel {
 
   _close() {
     this._kept.open = false;
-    keep(this._kept);
+    storeState(this._kept);
     this._show();
     cardButton(this._camera?.id)?.focus();
   }
@@ -165,7 +165,7 @@ class CameraPanel {
   /** @param {Place} place */
   _move({ dock, x, y }) {
     Object.assign(this._kept, { dock, x, y });
-    keep(this._kept);
+    storeState(this._kept);
     this._show();
   }
 
@@ -175,7 +175,7 @@ class CameraPanel {
    */
   _float(x, y) {
     Object.assign(this._kept, { x, y });
-    keep(this._kept);
+    storeState(this._kept);
     this._place();
   }
 

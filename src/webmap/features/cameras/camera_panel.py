@@ -7,7 +7,7 @@ import weakref
 from typing import TYPE_CHECKING, Any
 
 from webmap import html
-from webmap.features.cameras.camera_feed import AGE_LIMIT
+from webmap.features.cameras.camera import AGE_LIMIT
 
 if TYPE_CHECKING:
     from webmap import Element, Map, Robot
@@ -22,14 +22,14 @@ class CameraViews:
     def __init__(self) -> None:
         self.element: Element = html.div(class_="cameras")
         self._robot: Robot | None = None
-        self._views: list[View] = []
+        self._views: list[CameraPicture] = []
 
     def show(self, robot: "Robot | None") -> None:
         """Show the cameras of a robot in place of those of the last one."""
         self._robot = robot
         for view in self._views:
             view.destroy()
-        self._views = [View(camera) for camera in cameras_of(robot)]
+        self._views = [CameraPicture(camera) for camera in cameras_of(robot)]
         self.element.append(*(view.element for view in self._views))
 
     def poll(self) -> None:
@@ -40,7 +40,7 @@ class CameraViews:
             view.poll()
 
 
-class View:
+class CameraPicture:
     """The picture of one camera; a press shows it large."""
 
     def __init__(self, camera: Any) -> None:

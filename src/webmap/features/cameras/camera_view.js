@@ -183,7 +183,7 @@ function signButton(what, act) {
  *
  * @typedef {'side' | 'below' | 'float'} Dock
  *
- * @typedef {object} Kept
+ * @typedef {object} PanelState
  * @property {boolean} open
  * @property {Dock} dock
  * @property {string} camera The name of the camera that was chosen last.
@@ -194,12 +194,12 @@ function signButton(what, act) {
 const DOCKS = /** @type {const} */ (["side", "below", "float"]);
 
 /** The position until the operator moves the panel. */
-export const FOUND = { dock: /** @type {const} */ ("side"), x: 0, y: 0 };
+export const DEFAULTS = { dock: /** @type {const} */ ("side"), x: 0, y: 0 };
 
 const KEY = "webmap.camera";
 
-/** @returns {Kept} The stored state, or the defaults. */
-export function readKept() {
+/** @returns {PanelState} The stored state, or the defaults. */
+export function readState() {
   /** @type {any} */
   let stored = null;
   try {
@@ -218,8 +218,8 @@ export function readKept() {
   };
 }
 
-/** @param {Kept} kept */
-export function keep(kept) {
+/** @param {PanelState} kept */
+export function storeState(kept) {
   try {
     localStorage.setItem(KEY, JSON.stringify(kept));
   } catch {

@@ -13,7 +13,7 @@ from webmap import html, svg
 from webmap.discovery.doctor import BridgeFacts, ConfiguredRobot, Finding, judge
 from webmap.discovery.doctor.measure import TRYING, observe, tried
 from webmap.discovery.doctor.verdict import report as report_text
-from webmap.features.doctor.in_use import in_use
+from webmap.features.doctor.configured_robots import configured_robots
 
 if TYPE_CHECKING:
     from webmap import Bridge, Element, Map
@@ -150,7 +150,7 @@ class Report:
     def _start(self) -> None:
         """Check the robots that are shown now, with the topics that they use now."""
         made = self._map.module_arguments()
-        self._checkup.start(in_use(self._map.robots, self._bridge, made))
+        self._checkup.start(configured_robots(self._map.robots, self._bridge, made))
 
 
 def groups(findings: Sequence["Finding"]) -> "Iterator[Element]":

@@ -161,7 +161,7 @@ class Teleop {
     const verdict = this._drive.verdicts.find((one) => one.robot === robot);
     const request = requests.find((one) => one.robot === robot);
     this._requests.show(requests);
-    const useful = report !== null && ofUse(report);
+    const useful = report !== null && isStickUseful(report);
     this._stick.holonomic = this._drivingMap.holonomic;
     this._stick.show(useful, status.pressed && status.blocked);
     const pointers = { touch: this._touch.matches, stick: this._stick.wanted };
@@ -188,7 +188,7 @@ class Teleop {
  * @returns {boolean} Whether a stick could drive the robot without a request to another
  *     operator.
  */
-function ofUse(report) {
+function isStickUseful(report) {
   return mayTake(report) || (report.mine && !isLatched(report));
 }
 

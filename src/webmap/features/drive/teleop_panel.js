@@ -161,7 +161,7 @@ export class Panel {
   showButtons(report, asking, stick) {
     const name = report?.name ?? "";
     const robots = report === null ? [] : [report.robot];
-    const act = actOf(report, asking);
+    const act = controlAction(report, asking);
     setHidden(this._lease, act === null);
     if (act !== null) {
       setText(this._lease, act);
@@ -189,7 +189,7 @@ export class Panel {
  * @param {boolean} asking Whether this page has requested control.
  * @returns {string | null}
  */
-function actOf(report, asking) {
+function controlAction(report, asking) {
   if (report === null || report.changing) return null;
   if (report.mine) return "Release control";
   if (!report.armable || isLatched(report)) return null;

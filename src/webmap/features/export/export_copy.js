@@ -190,7 +190,7 @@ function writeStyle(copy, style, above) {
   const here = {};
   for (const name of INHERITED) {
     const value = style.getPropertyValue(name);
-    here[name] = name === "font-family" ? standingAlone(value) : value;
+    here[name] = name === "font-family" ? withGenericFamily(value) : value;
     if (here[name] === above[name]) copy.removeAttribute(name);
     else copy.setAttribute(name, here[name]);
   }
@@ -243,7 +243,7 @@ const KINDS = new Set(["serif", "sans-serif", "monospace", "cursive", "fantasy"]
  * @returns {string} The same list with a generic family at its end. The existing order
  *     stays, so that this machine draws as before.
  */
-export function standingAlone(families) {
+export function withGenericFamily(families) {
   const named = families.split(",").map((each) => each.trim().toLowerCase());
   if (named.some((each) => KINDS.has(each))) return families;
   const kind = named.includes("ui-monospace") ? "monospace" : "sans-serif";

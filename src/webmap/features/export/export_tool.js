@@ -1,5 +1,5 @@
 import { button, html, svg } from "../../web/tools/elements.js";
-import { Copier, embed, keepLength, standingAlone } from "./export_copy.js";
+import { Copier, embed, keepLength, withGenericFamily } from "./export_copy.js";
 import { overlayOf } from "../../web/tools/overlay.js";
 import { joinSaveMenu, offer } from "../../web/tools/save_menu.js";
 
@@ -280,7 +280,7 @@ function lines(text, style, frame) {
       // The base line of most fonts, in the box of a line.
       y: `${Number(y) + box.height / 2 + 0.35 * size}`,
       fill: style.color,
-      "font-family": standingAlone(style.fontFamily),
+      "font-family": withGenericFamily(style.fontFamily),
       "font-size": style.fontSize,
       "font-weight": style.fontWeight,
     });

@@ -1,4 +1,5 @@
 """Goals and initial poses: an operator points on the map, and the robot gets a pose.
 
-Open ``goal_tool.js`` first. The gate sends goals to robots.
+Open ``goal_tool.js`` first; ``goals.py`` has the modules of both tools. The gate sends
+goals to robots.
 """

@@ -46,7 +46,7 @@ export class GoalMarks {
     this._marks = new Map();
     this._drawing = svg("svg", { class: "webmap-aim-drawing", "aria-hidden": "true" });
     this._labels = html("div", "webmap-goal-labels");
-    this._elsewhere = new SentElsewhere(map.svg);
+    this._elsewhere = new TopicGoals(map.svg);
     this._offs = [
       () => this._elsewhere.destroy(),
       lay(map, this._drawing),
@@ -138,7 +138,7 @@ export class GoalMarks {
  * are the same goal. A hidden goal stays hidden afterwards, until the topic sends
  * another.
  */
-class SentElsewhere {
+class TopicGoals {
   /** @param {SVGSVGElement} mapSvg The map's element. */
   constructor(mapSvg) {
     this._svg = mapSvg;
@@ -166,7 +166,7 @@ class SentElsewhere {
       if (!robots.has(robot)) this._seen.set(robot, this._poses(robot));
     }
     this._robots = robots;
-    this._sheet.replaceSync(hidden(robots, this._seen));
+    this._sheet.replaceSync(hidingRules(robots, this._seen));
   }
 
   /** @param {string} robot @returns {string[]} */
@@ -185,7 +185,7 @@ const selector = (robot) => `[data-robot=${JSON.stringify(robot)}] .posestamped.
  *     robot.
  * @returns {string} The style sheet.
  */
-export function hidden(robots, seen) {
+export function hidingRules(robots, seen) {
   const rules = [...robots].map(selector);
   for (const [robot, poses] of seen) {
     for (const pose of poses) {

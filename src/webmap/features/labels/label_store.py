@@ -76,7 +76,7 @@ def read_labels(data: Any, of: str) -> tuple[Label, ...]:
     if isinstance(data, Mapping) and set(data) == {"labels"}:
         data = data["labels"]
     if isinstance(data, str | bytes) or not isinstance(data, Iterable):
-        raise _Misplaced((), of, f"expected a list of labels, got {_show(data)}")
+        raise _LabelError((), of, f"expected a list of labels, got {_show(data)}")
     found: list[Label] = []
     for number, each in enumerate(data):
         if len(found) == MAX_LABELS:
@@ -86,7 +86,7 @@ def read_labels(data: Any, of: str) -> tuple[Label, ...]:
             each = {key: each[key] for key in _KEYS}
         try:
             found.append(_label(each, f"{of}[{number}]"))
-        except _Misplaced as error:
+        except _LabelError as error:
             raise error.inside(number) from None
     return tuple(
         msgspec.structs.replace(label, id=f"c{number}")
@@ -94,15 +94,15 @@ def read_labels(data: Any, of: str) -> tuple[Label, ...]:
     )
 
 
-class _Misplaced(ConfigError):
+class _LabelError(ConfigError):
     """An error in a label, with its position in the file."""
 
     def __init__(self, path: tuple[str | int, ...], of: str, text: str) -> None:
         super().__init__(f"{of}: {text}" if of else text)
         self.path, self.of, self.text = path, of, text
 
-    def inside(self, number: int) -> "_Misplaced":
-        return _Misplaced((number, *self.path), self.of, self.text)
+    def inside(self, number: int) -> "_LabelError":
+        return _LabelError((number, *self.path), self.of, self.text)
 
 
 def label_file(file: str | Path) -> tuple[Label, ...]:
@@ -117,7 +117,7 @@ def label_file(file: str | Path) -> tuple[Label, ...]:
     document = LinedYaml(Path(file))
     try:
         return read_labels(document.data, "labels")
-    except _Misplaced as error:
+    except _LabelError as error:
         table = isinstance(document.data, Mapping) and set(document.data) == {"labels"}
         path = ("labels", *error.path) if table else error.path
         raise document.wrong(path, str(error)) from None
@@ -202,10 +202,10 @@ class LabelStore:
 def _label(data: Any, of: str) -> Label:
     def wrong(key: object, text: str) -> ConfigError:
         shown = key if key in _KEYS else _show(key)
-        return _Misplaced((str(key),), f"{of}{'.' if of else ''}{shown}", text)
+        return _LabelError((str(key),), f"{of}{'.' if of else ''}{shown}", text)
 
     if not isinstance(data, Mapping):
-        raise _Misplaced((), of, "expected a table with name, x and y")
+        raise _LabelError((), of, "expected a table with name, x and y")
     for key in data:
         if key not in _KEYS:
             hint = did_you_mean(key, _KEYS)

@@ -60,7 +60,7 @@ class Labels {
     this._ending = new AbortController();
     this._listen();
     this._offs = [
-      keepLabels(map),
+      fitLabels(map),
       lay(map, this._panel, "top-left"),
       devicesOf(map.drive).claimEscape(() => this._leave()),
       map.onSelect(() => this._refresh()),
@@ -306,7 +306,7 @@ const HEIGHT = 46;
  *     earlier names have priority.
  * @returns {boolean[]} For each name, whether there is no room.
  */
-export function crowded(names) {
+export function namesWithoutRoom(names) {
   /** @type {Name[]} */
   const shown = [];
   return names.map((name) => {
@@ -327,7 +327,7 @@ export function crowded(names) {
  * @param {MapCanvas} map
  * @returns {() => void} Ends the updates.
  */
-function keepLabels(map) {
+function fitLabels(map) {
   let frame = 0;
   const look = () => {
     frame = 0;
@@ -342,7 +342,7 @@ function keepLabels(map) {
       const across = text instanceof SVGTextElement ? text.getComputedTextLength() : 0;
       return { x: m?.e ?? 0, y: m?.f ?? 0, across: Math.max(across, 30) };
     });
-    crowded(names).forEach((hit, i) => labels[i].classList.toggle("crowded", hit));
+    namesWithoutRoom(names).forEach((hit, i) => labels[i].classList.toggle("crowded", hit));
   };
   const soon = () => {
     if (frame === 0) frame = requestAnimationFrame(look);

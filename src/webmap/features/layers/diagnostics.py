@@ -61,7 +61,7 @@ class PartOwners:
         if len(self._followers) < 2:
             return "own"
         # The text after the colon is a task, which may contain slashes too.
-        inside = bare(name).partition(":")[0]
+        inside = without_slashes(name).partition(":")[0]
         while inside and inside not in self._followers:
             inside = inside.rpartition("/")[0]
         if not inside:
@@ -74,7 +74,7 @@ class PartOwners:
             del self._followers[namespace]
 
 
-def bare(name: str) -> str:
+def without_slashes(name: str) -> str:
     """Return the name of a part, or a namespace, without outer slashes."""
     return name.strip("/")
 
@@ -155,7 +155,7 @@ class DiagnosticArrayMsg(Stamped, frozen=True, kw_only=True):
 
 
 @dataclass(frozen=True, slots=True)
-class Health:
+class PartReport:
     """The last report of one part."""
 
     name: str
@@ -240,12 +240,12 @@ class Diagnostics:
                 f"{namespace!r} and {prefix!r}"
             )
         self.robot = robot
-        self.namespace = bare(namespace)
+        self.namespace = without_slashes(namespace)
         self.prefix = prefix.lstrip("/")
         self.hold = hold
         self._owners = part_owners(bridge, topic)
         self._joined = None if self.prefix else self._owners.join(self.namespace)
-        self._parts: dict[str, Health] = {}
+        self._parts: dict[str, PartReport] = {}
         self._lists: list[Element] = []
         self._shown: list[tuple[str, str, str]] = []
         self._title = svg.title(text=NOT_RECEIVED_TITLE)
@@ -283,7 +283,7 @@ class Diagnostics:
         self.svg.remove()
 
     @property
-    def parts(self) -> list[Health]:
+    def parts(self) -> list[PartReport]:
         """The last reports of all parts, the worst first."""
         now = time.monotonic()
         parts = []
@@ -339,7 +339,7 @@ class Diagnostics:
         name = status.name[:LONGEST_NAME]
         if name not in self._parts and len(self._parts) >= MAX_PARTS:
             raise ProtocolError(f"the limit is {MAX_PARTS} parts")
-        health = Health(
+        health = PartReport(
             name,
             LEVELS[status.level],
             status.message[:LONGEST],
@@ -354,7 +354,7 @@ class Diagnostics:
         if not self._hides_worse(health):
             self._parts[name] = health
 
-    def _hides_worse(self, health: Health) -> bool:
+    def _hides_worse(self, health: PartReport) -> bool:
         """Return whether another part of this name recently reported a worse level.
 
         In ROS 2 the same nodes of two robots use the same names.
@@ -370,7 +370,7 @@ class Diagnostics:
             return "own" if name.lstrip("/").startswith(self.prefix) else "another"
         return self._owners.owner(name, self.namespace)
 
-    def _aged(self, part: Health, now: float) -> Health:
+    def _aged(self, part: PartReport, now: float) -> PartReport:
         if now - part.received_at <= self.hold or part.level == LEVELS[STALE]:
             return part
         message = f"no data for {now - part.received_at:.0f} s"
@@ -409,7 +409,7 @@ class Diagnostics:
             )
 
 
-def _level(parts: list[Health]) -> str | None:
+def _level(parts: list[PartReport]) -> str | None:
     """Return the worst level of parts that are sorted, the worst first."""
     if not parts:
         return None

@@ -42,7 +42,9 @@ def place_grid(origin: Pose, height: float) -> Affine:
     return placed @ Affine(1, 0, 0, -1, 0, height)
 
 
-async def draw_aside(pieces: "Sequence[NDArray[np.int8]]", palette: str) -> list[bytes]:
+async def draw_in_worker(
+    pieces: "Sequence[NDArray[np.int8]]", palette: str
+) -> list[bytes]:
     """Return pieces of a large grid as PNGs, drawn by the worker process.
 
     Args:

@@ -12,7 +12,7 @@ from webmap.base.processes import load_soon
 from webmap.base.scope import Removal, keep, no_scope
 from webmap.base.tasks import spawn
 from webmap.core.pictures import Picture
-from webmap.features.layers.grid_picture import draw_aside, grid_png, place_grid
+from webmap.features.layers.grid_picture import draw_in_worker, grid_png, place_grid
 from webmap.ros.offload import worker_kept
 from webmap.scene.element import Element
 
@@ -236,7 +236,7 @@ class GridTiles:
         overlap = OVERLAP * self.coarse
         x, end_x = _span(column, self._side, left, width, overlap)
         y, end_y = _span(row, self._side, low, height, overlap)
-        cells = coarser(self._cells[y:end_y, x:end_x], self.coarse, self.palette)
+        cells = downsample(self._cells[y:end_y, x:end_x], self.coarse, self.palette)
         tile = self.tiles[place]
         matrix = self._lattice.place(x + left, y + low, len(cells) * self.coarse)
         digest = hashlib.blake2b(repr(cells.shape).encode(), digest_size=16)
@@ -268,7 +268,7 @@ class GridTiles:
         if not batch:
             return
         try:
-            pngs = await draw_aside([each.cells for each in batch], self.palette)
+            pngs = await draw_in_worker([each.cells for each in batch], self.palette)
         except ProtocolError as error:
             for each in batch:
                 tile = self.tiles.get(each.place)
@@ -313,7 +313,9 @@ class GridTiles:
         self._undrawn.clear()
 
 
-def coarser(cells: "NDArray[np.int8]", times: int, palette: str) -> "NDArray[np.int8]":
+def downsample(
+    cells: "NDArray[np.int8]", times: int, palette: str
+) -> "NDArray[np.int8]":
     """Return a copy of cells with the greatest value of each square of cells.
 
     Args:

@@ -4,8 +4,10 @@ import math
 from dataclasses import KW_ONLY
 from typing import Annotated, Any
 
+from msgspec.structs import replace
+
 from webmap.base.errors import ProtocolError
-from webmap.base.geometry import FARTHEST, Affine
+from webmap.base.geometry import FARTHEST
 from webmap.config.robot import scan_name
 from webmap.modules.declaration import FoundTopic, TopicKind, layer
 from webmap.modules.layer_options import Limit
@@ -107,16 +109,15 @@ class LaserScanner(RobotLayer):
         if fault is not None:
             self.complain(fault)
         rays = scan_rays(message, self.max_dots)
-        took = len(message.ranges) * getattr(message, "time_increment", 0.0)
+        took = rays.total * getattr(message, "time_increment", 0.0)
         if 0.0 < took <= LONGEST_SWEEP:
             moved = self.placed.moved_within(message.frame_id, message.stamp, took)
-            rays = rays._replace(moved=(moved.x, moved.y, moved.yaw))
+            rays = replace(rays, moved=(moved.x, moved.y, moved.yaw))
         return rays
 
     def draw(self, found: Rays, at: Transform) -> None:
         """Draw the dots as seen from above."""
-        (a, c, _, e), (b, d, _, f), _ = at.rows
-        self.dots.set_rays(found._replace(place=Affine(a, b, c, d, e, f)))
+        self.dots.set_rays(replace(found, place=at.from_above))
 
 
 def scan_fault(scan: LaserScanMsg) -> str | None:

@@ -42,25 +42,25 @@ class OnMaps:
         self.robot = robot
         self.module = module
         self._arguments = (args, options)
-        self._made: dict[WorldView, Any] = {}
+        self._modules: dict[WorldView, Any] = {}
         for map in robot.maps:
             self.on_map(map, True)
 
     def destroy(self) -> None:
         """Remove the modules."""
-        for map in list(self._made):
+        for map in list(self._modules):
             self.on_map(map, False)
 
     def on_map(self, map: "WorldView", shown: bool) -> None:
         """Add the module to a map that shows the robot now, or remove it."""
         if not shown:
-            module = self._made.pop(map, None)
+            module = self._modules.pop(map, None)
             if module is not None and module in map.modules:
                 map.remove_module(module)
             return
         args, options = self._arguments
         try:
-            self._made[map] = map.add_module(self.module, *args, **options)
+            self._modules[map] = map.add_module(self.module, *args, **options)
         except ModuleNotFound:
             raise
         except WebMapError as error:

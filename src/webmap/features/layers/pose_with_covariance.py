@@ -18,7 +18,7 @@ from webmap.scene import svg
 AMCL, ODOMETRY = "geometry_msgs/PoseWithCovarianceStamped", "nav_msgs/Odometry"
 
 
-class PoseWithCovarianceMsg(msgspec.Struct, frozen=True):
+class UncertainPoseMsg(msgspec.Struct, frozen=True):
     """``geometry_msgs/PoseWithCovariance`` with its covariance."""
 
     pose: PoseMsg
@@ -39,13 +39,13 @@ class Ellipse(msgspec.Struct, frozen=True):
     """Angle from x to the longer axis, in radians."""
 
 
-class PoseWithCovarianceStampedMsg(Stamped, frozen=True, kw_only=True):
+class UncertainPoseStampedMsg(Stamped, frozen=True, kw_only=True):
     """``geometry_msgs/PoseWithCovarianceStamped`` and ``nav_msgs/Odometry``.
 
     Both have the fields that this view needs.
     """
 
-    pose: PoseWithCovarianceMsg
+    pose: UncertainPoseMsg
 
     @property
     def place(self) -> Pose:
@@ -106,7 +106,7 @@ class PoseWithCovarianceStampedMsg(Stamped, frozen=True, kw_only=True):
 @layer(
     AMCL,
     ODOMETRY,
-    view=PoseWithCovarianceStampedMsg,
+    view=UncertainPoseStampedMsg,
     kinds=[
         TopicKind(
             "covariance",
@@ -161,9 +161,7 @@ class PoseWithCovariance(RobotLayer):
             svg.path(class_="heading", fill="#e0a800", fill_opacity=0.35, stroke="none")
         )
 
-    def read(
-        self, message: PoseWithCovarianceStampedMsg
-    ) -> tuple[Pose, Ellipse, float]:
+    def read(self, message: UncertainPoseStampedMsg) -> tuple[Pose, Ellipse, float]:
         """Return the pose, the ellipse, and half the angle of the sector in radians.
 
         Raises:

@@ -1,4 +1,4 @@
 """The log of robots (``/rosout``) and its panel.
 
-Open ``rosout.py`` for receiving, ``rosout_panel.py`` for the panel.
+Open ``rosout.py`` first, which has the modules of both.
 """

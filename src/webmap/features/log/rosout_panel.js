@@ -73,8 +73,8 @@ class RosoutPanel {
     this._send = send;
     this._levels = levels;
     this._most = lines;
-    const { open, least } = kept();
-    /** @type {Book[]} By the bridge's number. */
+    const { open, least } = readChoice();
+    /** @type {BridgeLines[]} By the bridge's number. */
     this._books = [];
     this._choice = html("select", "");
     for (const each of levels) {
@@ -126,10 +126,10 @@ class RosoutPanel {
 
   /**
    * @param {string} name Of a bridge.
-   * @returns {Book}
+   * @returns {BridgeLines}
    */
   _begin(name) {
-    const book = new Book(name);
+    const book = new BridgeLines(name);
     this._count.parentElement?.append(book.element);
     return book;
   }
@@ -191,7 +191,7 @@ class RosoutPanel {
 }
 
 /** The lines of one bridge, the newest on top. */
-class Book {
+class BridgeLines {
   /** @param {string} name */
   constructor(name) {
     this.total = 0;
@@ -270,7 +270,7 @@ class Book {
 }
 
 /** @returns {{open: boolean, least: string}} */
-function kept() {
+function readChoice() {
   try {
     const { open, least } = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
     return { open: open === true, least: String(least) };

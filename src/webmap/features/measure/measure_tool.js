@@ -31,7 +31,7 @@ export default function attach(map, options) {
  * @param {Point} to
  * @returns {string} The distance, and the direction from x.
  */
-export function measured(from, to) {
+export function distanceText(from, to) {
   const [dx, dy] = [to.x - from.x, to.y - from.y];
   const degrees = Math.round((Math.atan2(dy, dx) * 180) / Math.PI + 360) % 360;
   return `${Math.hypot(dx, dy).toFixed(2)} m, ${degrees}°`;
@@ -164,6 +164,6 @@ class MeasureTool {
     const from = apply(this._map.view, line.from.x, line.from.y);
     const to = apply(this._map.view, line.to.x, line.to.y);
     this._path.setAttribute("d", `M${from.x} ${from.y}L${to.x} ${to.y}`);
-    setText(this._message, measured(line.from, line.to));
+    setText(this._message, distanceText(line.from, line.to));
   }
 }

@@ -110,7 +110,7 @@ export class Position {
  * @param {number} least Least distance of two groups, in parts of the time line.
  * @returns {Group[]} In the order of time; each begins with its first mark.
  */
-export function grouped(marks, seconds, least) {
+export function groupMarks(marks, seconds, least) {
   /** @type {Mark[][]} */
   const groups = [];
   for (const mark of [...marks].sort((a, b) => a.at - b.at)) {

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-_found: "WeakKeyDictionary[Bridge, Marks]" = WeakKeyDictionary()
+_newest_marks: "WeakKeyDictionary[Bridge, Marks]" = WeakKeyDictionary()
 """The newest marks of each recording, for pages that are opened later: the bridge sends
 marks that were found in several parts to its first listener only."""
 
@@ -38,14 +38,17 @@ class RecordingPlayer:
     Args:
         map: The map.
         bridge: The bridge to the replay.
-        give: Gives the replay a command.
+        send_command: Sends the replay a command.
     """
 
     def __init__(
-        self, map: "Map", bridge: "Bridge", give: Callable[[PlaybackCommand], object]
+        self,
+        map: "Map",
+        bridge: "Bridge",
+        send_command: Callable[[PlaybackCommand], object],
     ) -> None:
         self.map = map
-        self._give = give
+        self._send_command = send_command
         self._status: PlaybackStatus | None = None
         self._bridge = bridge
         self.browser_part = map.add_browser_part(
@@ -60,7 +63,7 @@ class RecordingPlayer:
         """Send the newest status to a page that was loaded."""
         if self._status is not None:
             self._send("status", self._status)
-        marks = _found.get(self._bridge)
+        marks = _newest_marks.get(self._bridge)
         if marks is not None:
             self._send("marks", marks)
 
@@ -71,7 +74,7 @@ class RecordingPlayer:
         except ConfigError as error:
             self.map.report_error(str(error))
             return
-        self._give(command)
+        self._send_command(command)
 
     def _on_status(self, text: StringMessage) -> None:
         status = _read(text, PlaybackStatus)
@@ -80,14 +83,13 @@ class RecordingPlayer:
         before, self._status = self._status, status
         self._send("status", status)
         if before is None and status.jumps == 0:
-            self._give(
-                PlaybackCommand("again")
-            )  # the first page sees it from its beginning
+            # The first page sees it from its beginning.
+            self._send_command(PlaybackCommand("again"))
 
     def _on_marks(self, text: StringMessage) -> None:
         marks = _read(text, Marks)
         if marks is not None:
-            _found[self._bridge] = marks
+            _newest_marks[self._bridge] = marks
             self._send("marks", marks)
 
     def _send(self, kind: str, value: PlaybackStatus | Marks) -> None:

@@ -16,7 +16,7 @@ const ON = 1e-6;
  * @param {Point[]} corners
  * @returns {Point[]} The corners without repetitions of the previous corner.
  */
-export function cleaned(corners) {
+export function withoutRepetitions(corners) {
   /** @type {Point[]} */
   const kept = [];
   for (const corner of corners) {
@@ -30,7 +30,7 @@ export function cleaned(corners) {
 /**
  * Return the reason why these corners form no area.
  *
- * @param {Point[]} corners As {@link cleaned} returns them, in metres.
+ * @param {Point[]} corners As {@link withoutRepetitions} returns them, in metres.
  * @returns {string} The problem and the requirement; empty if the corners form an area.
  */
 export function problemOf(corners) {
@@ -120,7 +120,7 @@ export function contains(corners, point) {
  * @returns {boolean} Whether the straight line between the two points stays in the
  *     area.
  */
-export function holds(corners, from, to) {
+export function isLineInside(corners, from, to) {
   // Between two crossings with sides the line is completely inside or outside.
   const cuts = [0, 1];
   for (const side of sidesOf(corners)) cuts.push(...cutsOf(from, to, side));
@@ -366,7 +366,7 @@ export class SweepNet {
    */
   _link(m, n) {
     const [p, q] = [this._nodes[m], this._nodes[n]];
-    if (!holds(this._area, p, q)) return false;
+    if (!isLineInside(this._area, p, q)) return false;
     const length = between(p, q);
     this._links[m].set(n, length);
     this._links[n].set(m, length);

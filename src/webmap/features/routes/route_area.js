@@ -3,7 +3,7 @@ import { attentive } from "../../web/inputs/focus.js";
 import { apply } from "../../web/view.js";
 import { button, html, setHidden, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
-import { cleaned, MOST_CORNERS, problemOf } from "./polygon.js";
+import { MOST_CORNERS, problemOf, withoutRepetitions } from "./polygon.js";
 import { PressAim } from "../../web/tools/aim.js";
 import { planSweeps, SPACING } from "./sweeps.js";
 
@@ -210,7 +210,7 @@ export class RouteArea {
   }
 
   _close() {
-    const problem = problemOf(cleaned(this._corners));
+    const problem = problemOf(withoutRepetitions(this._corners));
     if (problem) {
       this._refuse(problem);
       return;

@@ -398,7 +398,7 @@ const kept = new Map();
  * @param {Route} route
  * @param {number} now
  */
-export function keepRoute(map, route, now) {
+export function storeRoute(map, route, now) {
   kept.set(map, { route, at: now });
 }
 
@@ -408,7 +408,7 @@ export function keepRoute(map, route, now) {
  * @returns {Route | null} The route that was kept a moment ago; it is no longer kept
  *     afterwards.
  */
-export function keptRoute(map, now) {
+export function takeStoredRoute(map, now) {
   const { route, at } = kept.get(map) ?? { route: null, at: 0 };
   kept.delete(map);
   return route !== null && now - at < KEPT_FOR ? route : null;

@@ -5,7 +5,7 @@ import { lay } from "../../web/tools/overlay.js";
 import { foldedTool } from "../../web/tools/tool.js";
 import { RouteArea } from "./route_area.js";
 import { RoutePoints, SavedRoutes } from "./route_points.js";
-import { keepRoute, keptRoute, LEAST_LOOP, RouteRobots } from "./route_run.js";
+import { LEAST_LOOP, RouteRobots, storeRoute, takeStoredRoute } from "./route_run.js";
 
 /** @typedef {import('../../web/tools/aim.js').Pose} Pose */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -47,7 +47,7 @@ class RouteTool {
     this._map = map;
     /** @type {import('../../web/drive.js').Drive} */
     this._drive = map.drive;
-    const before = keptRoute(map.id, performance.now());
+    const before = takeStoredRoute(map.id, performance.now());
     /** @type {Pose[]} */
     this._points = before?.points ?? [];
     /** @type {Pose | null} The point that is being aimed. */
@@ -138,7 +138,7 @@ class RouteTool {
     clearInterval(this._timer);
     const [points, loop, open] = [this._points, this._loops, this._details.open];
     const runs = this._robots.destroy();
-    keepRoute(this._map.id, { points, loop, open, runs }, performance.now());
+    storeRoute(this._map.id, { points, loop, open, runs }, performance.now());
     this._aim.destroy();
     this._area.destroy();
     this._drawing.destroy();

@@ -45,7 +45,7 @@ class Route(msgspec.Struct, forbid_unknown_fields=True):
     """Whether the first goal follows the last."""
 
 
-class Saved(msgspec.Struct, forbid_unknown_fields=True):
+class RouteFile(msgspec.Struct, forbid_unknown_fields=True):
     """The content of a file."""
 
     map: str
@@ -147,18 +147,18 @@ class RouteStore:
             if saved.routes.pop(name, None) is not None:
                 self._write(saved)
 
-    def _read(self) -> Saved:
+    def _read(self) -> RouteFile:
         try:
             return msgspec.json.decode(
-                read_file(self.file, LARGEST_STATE, links=False), type=Saved
+                read_file(self.file, LARGEST_STATE, links=False), type=RouteFile
             )
         except FileNotFoundError:
-            return Saved(self._map)
+            return RouteFile(self._map)
         except (OSError, msgspec.DecodeError, RecursionError) as error:
             # The file stays unchanged, so that a person can repair it.
             raise ConfigError(f"{self.file} cannot be read: {error}") from error
 
-    def _write(self, saved: Saved) -> None:
+    def _write(self, saved: RouteFile) -> None:
         text = msgspec.json.format(msgspec.json.encode(saved), indent=2)
         try:
             write_file(self.file, text)

@@ -1,14 +1,14 @@
 import {
   along,
   between,
-  cleaned,
-  holds,
+  isLineInside,
   longestSide,
   nearestOn,
   problemOf,
   sidesOf,
   signedArea,
   SweepNet,
+  withoutRepetitions,
 } from "./polygon.js";
 
 /** @typedef {import('../../web/tools/aim.js').Pose} Pose */
@@ -51,26 +51,26 @@ const SAME = 1e-6;
  * @returns {Plan}
  */
 export function planSweeps(corners, { spacing, across = false, room }) {
-  const area = cleaned(corners);
+  const area = withoutRepetitions(corners);
   const problem = problemOf(area) || problemOfSpacing(spacing);
-  if (problem) return none(problem);
+  if (problem) return noPlan(problem);
   const frame = frameOf(area[0], longestSide(area) + (across ? Math.PI / 2 : 0));
   const local = area.map(frame.into);
   const lines = linesOver(local, spacing);
   // Every line has at least one point; an obviously too large number is not planned.
-  if (lines.count > room) return none(tooMany(lines.count, room, "at least "));
+  if (lines.count > room) return noPlan(tooMany(lines.count, room, "at least "));
   const straight = Array.from({ length: lines.count }, (_, line) =>
-    clipped(local, lines.at(line), spacing / 2).map(([a, b]) => ({ line, a, b })),
+    partsInArea(local, lines.at(line), spacing / 2).map(([a, b]) => ({ line, a, b })),
   ).flat();
-  if (straight.length > room) return none(tooMany(straight.length, room, "at least "));
-  const pieces = [...straight, ...intoCorners(local, straight, spacing)];
-  const plan = asPlan(inOrder(local, pieces), frame);
+  if (straight.length > room) return noPlan(tooMany(straight.length, room, "at least "));
+  const pieces = [...straight, ...cornerPieces(local, straight, spacing)];
+  const plan = planOf(orderPieces(local, pieces), frame);
   const { length } = plan.points;
-  return length > room ? none(tooMany(length, room, "")) : plan;
+  return length > room ? noPlan(tooMany(length, room, "")) : plan;
 }
 
 /** @param {string} problem @returns {Plan} */
-function none(problem) {
+function noPlan(problem) {
   return { problem, points: [], sweeps: [] };
 }
 
@@ -133,7 +133,7 @@ function linesOver(area, spacing) {
  * @param {number} inset Length to remove at each end.
  * @returns {[Point, Point][]} The parts of a line in the area, from left to right.
  */
-function clipped(area, y, inset) {
+function partsInArea(area, y, inset) {
   const xs = sidesOf(area).flatMap(([p, q]) =>
     p.y <= y === q.y <= y ? [] : p.x + ((y - p.y) / (q.y - p.y)) * (q.x - p.x),
   );
@@ -158,7 +158,7 @@ function clipped(area, y, inset) {
  * @param {number} spacing
  * @returns {Piece[]} Pieces from sweeps into the corners that the sweeps leave out.
  */
-function intoCorners(area, straight, spacing) {
+function cornerPieces(area, straight, spacing) {
   const turn = Math.sign(signedArea(area));
   const pieces = [...straight];
   for (const [i, corner] of area.entries()) {
@@ -185,7 +185,7 @@ function nearestSweep(area, pieces, corner) {
   return pieces
     .map(({ a, b }, piece) => ({ at: nearestOn([a, b], corner), piece }))
     .sort((p, q) => between(p.at, corner) - between(q.at, corner))
-    .find(({ at }) => holds(area, corner, at));
+    .find(({ at }) => isLineInside(area, corner, at));
 }
 
 /**
@@ -193,7 +193,7 @@ function nearestSweep(area, pieces, corner) {
  * @param {ReturnType<typeof frameOf>} frame
  * @returns {Plan}
  */
-function asPlan(legs, frame) {
+function planOf(legs, frame) {
   /** @type {Pose[]} */
   const points = [];
   const add = (/** @type {Point} */ at, /** @type {number} */ heading) => {
@@ -256,17 +256,17 @@ const MOST_STARTS = 8;
  * @param {Piece[]} pieces
  * @returns {Leg[]}
  */
-function inOrder(area, pieces) {
+function orderPieces(area, pieces) {
   const net = new SweepNet(area, pieces);
   /** @type {Walk | null} */
   let best = null;
   for (const start of startsOf(area[0], pieces)) {
-    const walk = walked(area, net, start);
+    const walk = walkFrom(area, net, start);
     if (best === null || isBetter(walk, best)) best = walk;
   }
   const steps = best?.steps ?? [];
   return steps.map(({ entry, path }) => ({
-    via: shortened(area, path),
+    via: withoutDetours(area, path),
     from: net.placeOf(entry),
     to: net.placeOf(net.exitOf(entry)),
   }));
@@ -304,7 +304,7 @@ function isBetter(one, other) {
  * @param {Entry} start
  * @returns {Walk}
  */
-function walked(area, net, start) {
+function walkFrom(area, net, start) {
   const todo = new Set(net.pieces.keys());
   /** @type {Walk} */
   const walk = { steps: [], jumps: 0, between: 0 };
@@ -324,7 +324,7 @@ function walked(area, net, start) {
     const here = net.placeOf(net.exitOf(entry));
     entry = nearest(net, here, todo);
     path = [];
-    if (!holds(area, here, net.placeOf(entry))) walk.jumps += 1;
+    if (!isLineInside(area, here, net.placeOf(entry))) walk.jumps += 1;
     walk.between += between(here, net.placeOf(entry));
   }
 }
@@ -350,13 +350,13 @@ function nearest(net, from, todo) {
  * @returns {Point[]} The necessary points between the ends, where straight lines stay
  *     in the area.
  */
-function shortened(area, path) {
+function withoutDetours(area, path) {
   /** @type {Point[]} */
   const via = [];
   const last = path.length - 1;
   for (let here = 0; here < last; ) {
     let there = last;
-    while (there > here + 1 && !holds(area, path[here], path[there])) there -= 1;
+    while (there > here + 1 && !isLineInside(area, path[here], path[there])) there -= 1;
     if (there < last) via.push(path[there]);
     here = there;
   }

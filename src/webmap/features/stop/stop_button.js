@@ -261,7 +261,7 @@ class Alarm {
     this._ending = new AbortController();
     const options = { capture: true, signal: this._ending.signal };
     const raise = (/** @type {Event} */ event) => {
-      if (coversAnew(event)) this._raise();
+      if (mayCover(event)) this._raise();
     };
     document.addEventListener("toggle", raise, options);
     document.addEventListener("fullscreenchange", () => this._raise(), options);
@@ -284,7 +284,7 @@ class Alarm {
  * @returns {boolean} Whether the element may cover the alarm now. Another map's alarm
  *     does not count, because the two would rise above each other for ever.
  */
-function coversAnew({ target }) {
+function mayCover({ target }) {
   const covers = "dialog, [popover]:not(.webmap-alarm)";
   return target instanceof Element && target.matches(covers);
 }

@@ -11,10 +11,12 @@ import threading
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from webmap.base.errors import ConfigError
-from webmap.features.tiles.tile_grid import MAX_ZOOM, Tile
+
+MAX_ZOOM = 24
+"""Greatest level of a tile."""
 
 LARGEST = 4 << 20
 """Greatest size of a tile, in bytes."""
@@ -29,6 +31,14 @@ MEDIA = {"png": "image/png", "jpeg": "image/jpeg", "webp": "image/webp"}
 SUFFIXES = ("png", "jpg", "jpeg", "webp")
 _HEADER = b"SQLite format 3\0"
 _STEPS = 10_000
+
+
+class Tile(NamedTuple):
+    """The number of a tile: its level, x from west and y from north, as in web maps."""
+
+    z: int
+    x: int
+    y: int
 
 
 class Source(Protocol):

@@ -43,7 +43,7 @@ export default function attach(map, options) {
  * @param {string} scope A selector of the element that contains the layers.
  * @returns {string} The style sheet that hides the layers that are off.
  */
-export function hiding(layers, shown, scope) {
+export function hidingRules(layers, shown, scope) {
   const rules = [];
   for (const [name, selector] of layers) {
     if (shown[name] === false) rules.push(`${scope} :is(${selector}) { display: none; }`);
@@ -61,7 +61,7 @@ export function hiding(layers, shown, scope) {
  * @returns {string[]} The drawings that have their own switch, in natural order; none
  *     if there is only one drawing.
  */
-export function several(drawings) {
+export function drawingNames(drawings) {
   const found = new Set();
   for (const { dataset } of drawings) if (dataset.layer) found.add(dataset.layer);
   const names = [...found].sort(order.compare);
@@ -77,7 +77,7 @@ class LayerSwitches {
     this._map = map;
     this._layers = layers;
     this._found = Object.fromEntries(off.map((name) => [name, false]));
-    this._shown = { ...this._found, ...kept() };
+    this._shown = { ...this._found, ...readChoice() };
     this._number = `${++maps}`;
     map.svg.dataset.layers = this._number;
     this._sheet = new CSSStyleSheet();
@@ -130,7 +130,7 @@ class LayerSwitches {
       const drawings = this._map.world.querySelectorAll(selector);
       if (drawings.length === 0) continue;
       there.add(name);
-      const names = several(drawings);
+      const names = drawingNames(drawings);
       for (const one of names.slice(0, MOST)) there.add(name + OF + one);
       this._note(name, names.length - MOST);
     }
@@ -146,7 +146,7 @@ class LayerSwitches {
     box.checked = this._shown[key] !== false;
     box.addEventListener("change", () => {
       this._shown[key] = box.checked;
-      keep(this._shown);
+      storeChoice(this._shown);
       this._apply();
     });
     const kind = one ? "webmap-layers-row one" : "webmap-layers-row";
@@ -189,7 +189,7 @@ class LayerSwitches {
    */
   _lay(open, shown) {
     this._shown = { ...shown };
-    keep(this._shown);
+    storeChoice(this._shown);
     for (const [key, row] of this._rows) {
       const box = row.querySelector("input");
       if (box) box.checked = this._shown[key] !== false;
@@ -200,14 +200,14 @@ class LayerSwitches {
 
   _apply() {
     const scope = `[data-layers="${this._number}"]`;
-    this._sheet.replaceSync(hiding(this._layers, this._shown, scope));
+    this._sheet.replaceSync(hidingRules(this._layers, this._shown, scope));
     this._map.crowd.restyle();
     this._map.crowd.settle();
   }
 }
 
 /** @returns {Record<string, boolean>} The choice stored in this browser. */
-function kept() {
+function readChoice() {
   try {
     const value = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
     const choices = Object.entries(value).filter(([, on]) => typeof on === "boolean");
@@ -218,7 +218,7 @@ function kept() {
 }
 
 /** @param {Record<string, boolean>} shown */
-function keep(shown) {
+function storeChoice(shown) {
   try {
     localStorage.setItem(KEPT, JSON.stringify(shown));
   } catch {

@@ -2,7 +2,6 @@
 
 import math
 from collections import deque
-from dataclasses import astuple
 from itertools import product
 
 from webmap.base.geometry import Twist
@@ -247,6 +246,6 @@ def _rounded(twist: Twist) -> list[tuple[float, ...]]:
     """Return the rounded values of a velocity: one, or more at a rounding edge."""
     parts = [
         {round(part - ROUNDING, DIGITS) + 0.0, round(part + ROUNDING, DIGITS) + 0.0}
-        for part in astuple(twist)
+        for part in twist.numbers
     ]
     return list(product(*parts))

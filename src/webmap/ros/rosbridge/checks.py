@@ -18,7 +18,7 @@ from urllib.parse import urlsplit
 
 from webmap.base.errors import BridgeError
 from webmap.ros.limits import MAX_FRAME
-from webmap.ros.received import ReceivedMessage
+from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.rosbridge import ops
 from webmap.ros.rosbridge.events import CallService, Publish, ServiceResponse
 from webmap.ros.rosbridge.protocol import Protocol

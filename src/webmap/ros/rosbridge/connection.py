@@ -14,10 +14,10 @@ from webmap.base.errors import BridgeClosed
 from webmap.base.processes import load
 from webmap.ros.backoff import Backoff
 from webmap.ros.limits import MAX_FRAME
-from webmap.ros.received import LinkState
+from webmap.ros.received_message import LinkState
 
 if TYPE_CHECKING:
-    from webmap.ros.rosbridge.paced import PacedConnection
+    from webmap.ros.rosbridge.websocket import WebSocketConnection
 
 log = logging.getLogger("webmap.ros")
 
@@ -60,7 +60,7 @@ class BridgeConnection:
     ) -> None:
         self.url = url
         self.state: LinkState = "new"
-        self._socket: PacedConnection | None = None
+        self._socket: WebSocketConnection | None = None
         self._heard: float | None = None
         """When the last bytes of the socket before came."""
         self._liveness: Liveness | None = None
@@ -155,7 +155,7 @@ class BridgeConnection:
             self._closed(reason)
         return time.monotonic() - began
 
-    async def _serve(self, socket: "PacedConnection") -> str:
+    async def _serve(self, socket: "WebSocketConnection") -> str:
         """Send and receive frames until the connection ends; return the reason."""
         self.state, self._socket = "open", socket
         keeping = asyncio.create_task(self._keep_alive(socket))
@@ -181,7 +181,7 @@ class BridgeConnection:
         except Exception:
             log.exception("%s: a frame of %d bytes was lost", self.url, len(frame))
 
-    def _forget_link(self, socket: "PacedConnection") -> None:
+    def _forget_link(self, socket: "WebSocketConnection") -> None:
         socket.transport.abort()
         self._socket, self._heard = None, socket.bytes_came
         self._liveness = None
@@ -189,7 +189,7 @@ class BridgeConnection:
         self._unsent.clear()
         self._unsent_size = 0
 
-    async def _write(self, socket: "PacedConnection") -> None:
+    async def _write(self, socket: "WebSocketConnection") -> None:
         from websockets.exceptions import ConnectionClosed
 
         try:
@@ -203,7 +203,7 @@ class BridgeConnection:
         except ConnectionClosed:
             pass  # the reader reports it
 
-    async def _keep_alive(self, socket: "PacedConnection") -> None:
+    async def _keep_alive(self, socket: "WebSocketConnection") -> None:
         """Send pings; drop the connection and return when it is dead."""
         self._liveness = liveness = Liveness(time.monotonic())
         pinging: set[asyncio.Task[None]] = set()
@@ -220,7 +220,7 @@ class BridgeConnection:
             for task in pinging:
                 task.cancel()
 
-    async def _ping(self, socket: "PacedConnection", liveness: "Liveness") -> None:
+    async def _ping(self, socket: "WebSocketConnection", liveness: "Liveness") -> None:
         from websockets.exceptions import ConnectionClosed
 
         try:
@@ -231,12 +231,12 @@ class BridgeConnection:
         liveness.ponged(time.monotonic())
 
 
-async def _connect(url: str) -> "PacedConnection":
-    await load("webmap.ros.rosbridge.paced")
+async def _connect(url: str) -> "WebSocketConnection":
+    await load("webmap.ros.rosbridge.websocket")
 
     from websockets.asyncio.client import connect
 
-    from webmap.ros.rosbridge.paced import CLOSE_TIMEOUT, PacedConnection
+    from webmap.ros.rosbridge.websocket import CLOSE_TIMEOUT, WebSocketConnection
 
     class ConnectHere(connect):
         """Connect to the given address, without redirects."""
@@ -253,13 +253,13 @@ async def _connect(url: str) -> "PacedConnection":
         close_timeout=CLOSE_TIMEOUT,
         proxy=None,
         user_agent_header=None,
-        create_connection=PacedConnection,
+        create_connection=WebSocketConnection,
     )
-    assert isinstance(socket, PacedConnection)
+    assert isinstance(socket, WebSocketConnection)
     return socket
 
 
-async def _close(socket: "PacedConnection") -> None:
+async def _close(socket: "WebSocketConnection") -> None:
     with suppress(TimeoutError):
         async with asyncio.timeout(0.5):
             await socket.close()

@@ -14,7 +14,7 @@ from webmap.base.identifiers import generate_id
 from webmap.base.text import one_line
 from webmap.ros.definitions import Definitions
 from webmap.ros.names import split_type
-from webmap.ros.received import BridgeStats, ReceivedMessage
+from webmap.ros.received_message import BridgeStats, ReceivedMessage
 from webmap.ros.rosbridge import ops
 from webmap.ros.rosbridge.calls import Calls
 from webmap.ros.rosbridge.connection import CLOSED_HERE, BridgeConnection

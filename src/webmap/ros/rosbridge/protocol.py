@@ -20,6 +20,8 @@ from webmap.ros.decoding import check_depth, convert, decode_json
 from webmap.ros.limits import LARGE, MAX_FRAME, MIB
 from webmap.ros.rosbridge import cbor
 from webmap.ros.rosbridge.events import (
+    MAX_NUMBERS,
+    MAX_OTHER,
     CallService,
     Event,
     Malformed,
@@ -27,9 +29,9 @@ from webmap.ros.rosbridge.events import (
     ServiceResponse,
     Status,
     Unknown,
+    check_count,
 )
-from webmap.ros.rosbridge.frame_limits import MAX_NUMBERS, MAX_OTHER, check_count
-from webmap.ros.rosbridge.incoming import SHORTENED
+from webmap.ros.rosbridge.frame_reader import SHORTENED
 
 
 def decode_png(data: str, *, max_bytes: int = MAX_OTHER) -> bytes:

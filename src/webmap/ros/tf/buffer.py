@@ -209,6 +209,38 @@ class Buffer:
         path = self._path(target, source)
         return self._along(path, (path.newest or 0.0) if time is None else time, ahead)
 
+    def lookup_carried(
+        self, target: str, source: str, carrier: str, time: float
+    ) -> tuple[Transform, Transform | None]:
+        """Return the transform of a frame at a time, and that of one that carries it.
+
+        Args:
+            target: The frame of the results.
+            source: The frame of the given coordinates, such as that of a sensor.
+            carrier: A frame that is usually between both, such as that of the base:
+                both transforms then cost as much as one.
+            time: The time, in seconds of the robot's clock.
+
+        Returns:
+            The transforms from the source, as by :meth:`lookup`, and from the carrier,
+            as by :meth:`find`; None if the latter is not known.
+
+        Raises:
+            TransformError: If the first is not known; see :meth:`lookup`.
+
+        """
+        path = self._path(target, source)
+        if not path.down:
+            whole, carried = self._to_ancestor(path.up, time, 0.0, carrier)
+            if carried is not None:
+                return whole, carried
+        else:
+            whole = self._along(path, time, 0.0)
+        try:
+            return whole, self.find(target, carrier, time).transform
+        except TransformError:
+            return whole, None
+
     def find(self, target: str, source: str, time: float = 0.0) -> Found:
         """Return the transform at a time, or the newest one if that time is not known.
 
@@ -361,18 +393,26 @@ class Buffer:
 
     def _along(self, path: _TrackPath, time: float, ahead: float) -> Transform:
         """Return the transform from the source of the tracks to their target."""
+        up, _ = self._to_ancestor(path.up, time, ahead)
         if not path.down:
-            return self._to_ancestor(path.up, time, ahead)
-        down = self._to_ancestor(path.down, time, ahead)
-        return down.inverse @ self._to_ancestor(path.up, time, ahead)
+            return up
+        down, _ = self._to_ancestor(path.down, time, ahead)
+        return down.inverse @ up
 
-    def _to_ancestor(self, tracks: list[Track], time: float, ahead: float) -> Transform:
-        """Return the transform from the first frame to the last one's parent."""
-        total = None
+    def _to_ancestor(
+        self, tracks: list[Track], time: float, ahead: float, carrier: str = ""
+    ) -> tuple[Transform, Transform | None]:
+        """Return the transform from the first frame to the last one's parent.
+
+        And that from the carrier, None if it is not one of the frames.
+        """
+        total = carried = None
         for track in reversed(tracks):
             try:
                 found = track.at(time, self.gap, ahead)
             except NotKnownThen as error:
                 raise NotKnownThen(f"{track.name}: {error}") from None
             total = found if total is None else total @ found
-        return total or Transform()
+            if track.frame == carrier:
+                carried = total
+        return total or Transform(), carried

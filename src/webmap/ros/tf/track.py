@@ -33,6 +33,7 @@ class Track:
 
     def __init__(self, parent: str, frame: str = "", *, static: bool = False) -> None:
         self.parent = parent
+        self.frame = frame
         self.name = f"{parent!r} -> {frame!r}"
         """The name in error messages."""
         self.static = static

@@ -1,7 +1,8 @@
 """The transform between two frames, in space, and its errors."""
 
 import math
-from dataclasses import dataclass
+
+import msgspec
 
 from webmap.base.errors import WebMapError
 from webmap.base.geometry import FARTHEST, Affine, Pose, Quaternion, Vector3
@@ -35,8 +36,7 @@ class NotKnownThen(TransformError):
     """Both frames are connected, but a transform between is not known at that time."""
 
 
-@dataclass(frozen=True, slots=True)
-class Transform:
+class Transform(msgspec.Struct, frozen=True, gc=False):
     """A transform from coordinates of one frame to those of another: turns, then moves.
 
     Its name shows the frames: ``map_from_base`` transforms coordinates of the base to
@@ -67,8 +67,9 @@ class Transform:
         vertical.
         """
         q, by = self.rotation, self.translation
-        x, y = _turn(q, Vector3(1.0)), _turn(q, Vector3(0.0, 1.0))
-        return Affine(x.x, x.y, y.x, y.y, by.x, by.y)
+        a, b, _ = _turn(q, 1.0, 0.0, 0.0)
+        c, d, _ = _turn(q, 0.0, 1.0, 0.0)
+        return Affine(a, b, c, d, by.x, by.y)
 
     @property
     def upright(self) -> bool:
@@ -82,44 +83,47 @@ class Transform:
         The rest tilts and lifts, and is applied first. The whole transform is
         ``Transform.from_pose(pose) @ tilt``. For an upright frame the rest only lifts.
         """
-        pose = self.planar
-        lift = Vector3(0.0, 0.0, self.translation.z)
-        if self.upright:
+        q, by = self.rotation, self.translation
+        pose = Pose(by.x, by.y, q.yaw)
+        lift = Vector3(0.0, 0.0, by.z)
+        if abs(q.x) < _LEVEL and abs(q.y) < _LEVEL:  # upright
             return pose, Transform(lift)
-        back = Quaternion.from_yaw(-pose.yaw)
-        return pose, Transform(lift, _times(back, self.rotation))
+        return pose, Transform(lift, _times(Quaternion.from_yaw(-pose.yaw), q))
 
     @property
     def rows(self) -> tuple[tuple[float, float, float, float], ...]:
         """The upper three rows of its matrix; the last column is the translation."""
         q, by = self.rotation, self.translation
-        x, y, z = (
-            _turn(q, axis)
-            for axis in (Vector3(1.0), Vector3(0.0, 1.0), Vector3(0.0, 0.0, 1.0))
-        )
+        x = _turn(q, 1.0, 0.0, 0.0)
+        y = _turn(q, 0.0, 1.0, 0.0)
+        z = _turn(q, 0.0, 0.0, 1.0)
         return (
-            (x.x, y.x, z.x, by.x),
-            (x.y, y.y, z.y, by.y),
-            (x.z, y.z, z.z, by.z),
+            (x[0], y[0], z[0], by.x),
+            (x[1], y[1], z[1], by.y),
+            (x[2], y[2], z[2], by.z),
         )
 
     def apply(self, point: Vector3) -> Vector3:
         """Return the coordinates of a point in the other frame."""
-        turned, by = _turn(self.rotation, point), self.translation
-        return Vector3(turned.x + by.x, turned.y + by.y, turned.z + by.z)
+        x, y, z = _turn(self.rotation, point.x, point.y, point.z)
+        by = self.translation
+        return Vector3(x + by.x, y + by.y, z + by.z)
 
     def __matmul__(self, other: "Transform") -> "Transform":
         """Return the transform that applies ``other`` first, then this one."""
+        q, by, to = self.rotation, self.translation, other.translation
+        x, y, z = _turn(q, to.x, to.y, to.z)
         return Transform(
-            self.apply(other.translation), _times(self.rotation, other.rotation)
+            Vector3(x + by.x, y + by.y, z + by.z), _times(q, other.rotation)
         )
 
     @property
     def inverse(self) -> "Transform":
         """The inverse transform."""
         back = _conjugate(self.rotation)
-        moved = _turn(back, self.translation)
-        return Transform(Vector3(-moved.x, -moved.y, -moved.z), back)
+        by = self.translation
+        x, y, z = _turn(back, by.x, by.y, by.z)
+        return Transform(Vector3(-x, -y, -z), back)
 
     def checked(self) -> "Transform":
         """Return the same transform with a rotation of norm 1.
@@ -158,12 +162,30 @@ def between(one: Transform, other: Transform, share: float) -> Transform:
         share: The fraction, from 0 to 1.
 
     """
-    a, b = one.translation, other.translation
+    a, b, p, q = one.translation, other.translation, one.rotation, other.rotation
     rest = 1.0 - share
     place = Vector3(
         rest * a.x + share * b.x, rest * a.y + share * b.y, rest * a.z + share * b.z
     )
-    return Transform(place, _slerp(one.rotation, other.rotation, share))
+    cosine = p.x * q.x + p.y * q.y + p.z * q.z + p.w * q.w
+    sign = 1.0 if cosine >= 0 else -1.0  # both are one rotation; take the nearer
+    cosine = min(abs(cosine), 1.0)
+    if cosine > _PARALLEL:
+        first, second = rest, share
+    else:
+        angle = math.acos(cosine)
+        first = math.sin(rest * angle) / math.sin(angle)
+        second = math.sin(share * angle) / math.sin(angle)
+    second *= sign
+    return Transform(
+        place,
+        _normalised(
+            first * p.x + second * q.x,
+            first * p.y + second * q.y,
+            first * p.z + second * q.z,
+            first * p.w + second * q.w,
+        ),
+    )
 
 
 def alike(one: Transform, other: Transform, apart: float, turned: float) -> bool:
@@ -184,49 +206,32 @@ def alike(one: Transform, other: Transform, apart: float, turned: float) -> bool
     return math.hypot(rest.x, rest.y, rest.z) <= math.sin(min(turned, math.pi) / 2)
 
 
-def _slerp(p: Quaternion, q: Quaternion, share: float) -> Quaternion:
-    cosine = p.x * q.x + p.y * q.y + p.z * q.z + p.w * q.w
-    sign = 1.0 if cosine >= 0 else -1.0  # both are one rotation; take the nearer
-    cosine = min(abs(cosine), 1.0)
-    if cosine > _PARALLEL:
-        first, second = 1.0 - share, share
-    else:
-        angle = math.acos(cosine)
-        first = math.sin((1.0 - share) * angle) / math.sin(angle)
-        second = math.sin(share * angle) / math.sin(angle)
-    second *= sign
-    mixed = Quaternion(
-        first * p.x + second * q.x,
-        first * p.y + second * q.y,
-        first * p.z + second * q.z,
-        first * p.w + second * q.w,
-    )
-    norm = mixed.norm
-    return Quaternion(mixed.x / norm, mixed.y / norm, mixed.z / norm, mixed.w / norm)
+def _normalised(x: float, y: float, z: float, w: float) -> Quaternion:
+    norm = math.hypot(x, y, z, w)
+    return Quaternion(x / norm, y / norm, z / norm, w / norm)
 
 
 def _times(p: Quaternion, q: Quaternion) -> Quaternion:
-    product = Quaternion(
+    return _normalised(
         p.w * q.x + p.x * q.w + p.y * q.z - p.z * q.y,
         p.w * q.y - p.x * q.z + p.y * q.w + p.z * q.x,
         p.w * q.z + p.x * q.y - p.y * q.x + p.z * q.w,
         p.w * q.w - p.x * q.x - p.y * q.y - p.z * q.z,
     )
-    n = product.norm
-    return Quaternion(product.x / n, product.y / n, product.z / n, product.w / n)
 
 
 def _conjugate(q: Quaternion) -> Quaternion:
     return Quaternion(-q.x, -q.y, -q.z, q.w)
 
 
-def _turn(q: Quaternion, v: Vector3) -> Vector3:
+def _turn(q: Quaternion, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """Return a rotated vector, as bare numbers."""
     # v + 2 w (u x v) + 2 u x (u x v), where u is the vector part.
-    tx = 2.0 * (q.y * v.z - q.z * v.y)
-    ty = 2.0 * (q.z * v.x - q.x * v.z)
-    tz = 2.0 * (q.x * v.y - q.y * v.x)
-    return Vector3(
-        v.x + q.w * tx + q.y * tz - q.z * ty,
-        v.y + q.w * ty + q.z * tx - q.x * tz,
-        v.z + q.w * tz + q.x * ty - q.y * tx,
+    tx = 2.0 * (q.y * z - q.z * y)
+    ty = 2.0 * (q.z * x - q.x * z)
+    tz = 2.0 * (q.x * y - q.y * x)
+    return (
+        x + q.w * tx + q.y * tz - q.z * ty,
+        y + q.w * ty + q.z * tx - q.x * tz,
+        z + q.w * tz + q.x * ty - q.y * tx,
     )

@@ -7,7 +7,7 @@ from typing import cast
 
 from webmap.base.geometry import Affine
 from webmap.scene.allowed import ATTRIBUTES, EVENTS
-from webmap.scene.bound import BoundElement, Document
+from webmap.scene.document import BoundElement, Document
 from webmap.scene.element import Element
 from webmap.scene.node import Added, Changed, Fragment, Node, Removed, Text
 from webmap.scene.wire.opcodes import (

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 from webmap.ros.definitions import OCTETS, Field
-from webmap.ros.rosbridge.server.quirks import Quirks
+from webmap.ros.rosbridge.server.dialect import Quirks
 from webmap.ros.rosbridge.server.schema import DTYPES, Schema
 
 # RFC 8746: typed arrays, little-endian.

@@ -6,14 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from webmap.ros.definitions import FLOATS, INTEGERS, TIMES, Field, UnknownType
-from webmap.ros.rosbridge.server.dialect import canonical, resolve
-from webmap.ros.rosbridge.server.graph import (
-    Graph,
-    GraphTopic,
-    Respond,
-    ServiceFailed,
-)
-from webmap.ros.rosbridge.server.quirks import Quirks
+from webmap.ros.rosbridge.server.dialect import Quirks, canonical, resolve
+from webmap.ros.rosbridge.server.graph import Graph, GraphTopic, Respond, ServiceFailed
 from webmap.ros.rosbridge.server.schema import Schema
 
 NODE = "/rosapi"

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from webmap.ros.conforming import Conformer, Misfit, check_size, wrong
 from webmap.ros.definitions import (
     FLOATS,
     INTEGERS,
@@ -20,6 +19,7 @@ from webmap.ros.definitions import (
     UnknownType,
     shipped,
 )
+from webmap.ros.message_check import MessageCheck, Misfit, check_size, wrong
 from webmap.ros.rosbridge.server.dialect import Dialect, canonical
 
 DTYPES: dict[str, str] = {
@@ -122,7 +122,7 @@ class Schema:
             raise MessageMismatch(text) from None
 
 
-class _FromClient(Conformer):
+class _FromClient(MessageCheck):
     """Accepts the values that rosbridge accepts from a client."""
 
     def __init__(self, dialect: Dialect, *, finite: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""Sends the selected robots to a place on the map."""
+"""Tools that send a goal or an initial pose to the selected robots."""
 
 import logging
 from typing import TYPE_CHECKING, Any
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from webmap.core.robot import Robot
 
 log = logging.getLogger("webmap.modules.goal_tool")
-
+_pose_log = logging.getLogger("webmap.modules.initial_pose")
 
 SPACING = (0.3, 20.0)
 """Smallest and greatest distance between robots that are sent together, in metres."""
@@ -89,3 +89,69 @@ class GoalTool:
                 self.map.notify_modules("on_goal_canceled", robot)
         else:
             log.warning("%r: an unknown message of the page was ignored", self.map)
+
+
+@map_modules.register
+class InitialPoseTool:
+    """A press on the map sets the selected robot's position, a drag sets its heading.
+
+    The tool begins with its button, its key or :meth:`aim`. The aimed pose is drawn
+    with the ellipse and the wedge of two standard deviations, which the robot receives
+    with the pose. The page sends the pose to the gate, which refuses it while the robot
+    moves, follows a goal, or another operator has control.
+
+    Fires ``on_pose_told(robot, x, y, yaw)`` on the map's modules when the gate has
+    accepted the pose.
+
+    Args:
+        map: The map.
+        button: Whether the map has a button for the tool.
+        key: The key that begins the tool.
+
+    Raises:
+        ValueError: If ``key`` is not one character.
+    """
+
+    def __init__(self, map: "Map", *, button: bool = True, key: str = "i") -> None:
+        if len(key) != 1:
+            raise ValueError(f"InitialPoseTool: key must be one character, got {key!r}")
+        self.map = map
+        self.browser_part = map.add_browser_part(
+            self,
+            "features/goals/initial_pose_tool.js",
+            {"button": button, "key": key},
+            "features/goals/goal_tool.css",
+        )
+
+    def aim(self) -> None:
+        """Make the operator's next press on the map the robot's pose."""
+        self.browser_part.send({"active": True})
+
+    def on_message(self, message: dict[str, Any]) -> None:
+        """Handle the page's message of a sent pose, or send the page variances."""
+        if "covariance" in message:
+            self._send_covariance(message["covariance"])
+        elif isinstance(message.get("pose"), dict):
+            pose = robot_and_pose(self.map, message["pose"])
+            if pose is not None:
+                self.map.notify_modules("on_pose_told", *pose)
+        else:
+            _pose_log.warning(
+                "%r: an unknown message of the page was ignored", self.map
+            )
+
+    def _send_covariance(self, id: Any) -> None:
+        robot = self.map.find_robot(id)
+        spec = robot.motion.spec() if robot is not None else None
+        if robot is None or spec is None or spec.pose_topic is None:
+            self.browser_part.send({"covariance": None})
+            return
+        x, y, yaw = spec.pose_covariance
+        covariance = {
+            "robot": robot.id,
+            "x": x,
+            "y": y,
+            "yaw": yaw,
+            "turn": spec.own_map[2],
+        }
+        self.browser_part.send({"covariance": covariance})

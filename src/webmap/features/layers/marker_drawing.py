@@ -1,14 +1,14 @@
-"""How each type of ``visualization_msgs/Marker`` looks from above."""
+"""``visualization_msgs/Marker``: its message, and how each type looks from above."""
 
 import math
 from collections.abc import Callable, Iterable
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
+
+import msgspec
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import FARTHEST, Affine, Vector3
-from webmap.features.layers.markers import messages as kinds
-from webmap.features.layers.markers.messages import ColorMsg, MarkerMsg
 from webmap.modules.drawing import (
     Point,
     box,
@@ -19,20 +19,87 @@ from webmap.modules.drawing import (
     in_space,
     rounded,
 )
+from webmap.ros.messages import Header, PointMsg, PoseMsg, Stamped, Time
 from webmap.ros.tf import Transform
 from webmap.scene import svg
 from webmap.scene.element import Element
+
+ARROW, CUBE, SPHERE, CYLINDER, LINE_STRIP, LINE_LIST = range(6)
+CUBE_LIST, SPHERE_LIST, POINTS, TEXT_VIEW_FACING, MESH_RESOURCE, TRIANGLE_LIST = range(
+    6, 12
+)
+
+ADD, DELETE, DELETE_ALL = 0, 2, 3
+
+
+class ColorMsg(msgspec.Struct, frozen=True, gc=False):
+    """``std_msgs/ColorRGBA``; each component from 0 to 1."""
+
+    r: float
+    g: float
+    b: float
+    a: float = 1.0
+
+
+class MarkerHeader(Header, frozen=True, gc=False):
+    """The header of a marker."""
+
+    seq: int | None = None
+    """The number of the message; only ROS 1 has one."""
+
+
+class MarkerMsg(Stamped, frozen=True, kw_only=True):
+    """``visualization_msgs/Marker``."""
+
+    header: MarkerHeader = MarkerHeader()
+    type: int
+    action: int
+    pose: PoseMsg
+    scale: PointMsg
+    """In metres; the meaning of each depends on the type."""
+
+    color: ColorMsg
+    ns: str = ""
+    id: int = 0
+    lifetime: Time = Time()
+    """Time for which the marker is shown; 0 for ever."""
+
+    points: list[PointMsg] = msgspec.field(default_factory=list)
+    """In the frame of :attr:`pose`."""
+
+    colors: list[ColorMsg] = msgspec.field(default_factory=list)
+    """One for each point, or none."""
+
+    text: str = ""
+    frame_locked: bool = False
+    """Whether the marker moves with its frame."""
+
+    def clears(self, ns: str) -> bool:
+        """Return whether the action :data:`DELETE_ALL` deletes markers of a namespace.
+
+        In ROS 2, a namespace limits it to the markers of this namespace. ROS 1 deletes
+        all markers of the topic, whatever the namespace.
+        """
+        return self.ns in ("", ns) or self.header.seq is not None
+
+
+class MarkerArrayMsg(msgspec.Struct, frozen=True):
+    """``visualization_msgs/MarkerArray``."""
+
+    separable: ClassVar = True
+    markers: list[MarkerMsg]
+
 
 SHADES = 16
 """Number of steps to which the colours of single points are rounded, from 0 to 1."""
 
 
-def filled(colour: ColorMsg) -> dict[str, Any]:
+def area_style(colour: ColorMsg) -> dict[str, Any]:
     """Return the attributes of an area with a colour."""
     return {"fill": _rgb(colour), "fill_opacity": _alpha(colour)}
 
 
-def drawn(colour: ColorMsg, width: float) -> dict[str, Any]:
+def line_style(colour: ColorMsg, width: float) -> dict[str, Any]:
     """Return the attributes of a line with a colour and a width in metres."""
     return {
         "stroke": _rgb(colour),
@@ -86,17 +153,17 @@ LETTERS = 16.0
 """The size of letters before they are scaled: browsers round sizes below 1."""
 
 CLASSES = {
-    kinds.ARROW: "arrow",
-    kinds.CUBE: "cube",
-    kinds.SPHERE: "sphere",
-    kinds.CYLINDER: "cylinder",
-    kinds.LINE_STRIP: "line-strip",
-    kinds.LINE_LIST: "line-list",
-    kinds.CUBE_LIST: "cube-list",
-    kinds.SPHERE_LIST: "sphere-list",
-    kinds.POINTS: "points",
-    kinds.TEXT_VIEW_FACING: "text",
-    kinds.TRIANGLE_LIST: "triangle-list",
+    ARROW: "arrow",
+    CUBE: "cube",
+    SPHERE: "sphere",
+    CYLINDER: "cylinder",
+    LINE_STRIP: "line-strip",
+    LINE_LIST: "line-list",
+    CUBE_LIST: "cube-list",
+    SPHERE_LIST: "sphere-list",
+    POINTS: "points",
+    TEXT_VIEW_FACING: "text",
+    TRIANGLE_LIST: "triangle-list",
 }
 """The CSS class of each type that can be drawn."""
 
@@ -143,7 +210,7 @@ def _text(marker: MarkerMsg, _: Transform) -> Iterable[Element]:
         text_anchor="middle",
         dominant_baseline="central",
         text_rendering="geometricPrecision",
-        **filled(marker.color),
+        **area_style(marker.color),
     )
     return (text,)
 
@@ -174,12 +241,12 @@ def _arrow(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
     corners = [(0, shaft), (neck, shaft), (neck, wide), (seen, 0)]
     corners += [(neck, -wide), (neck, -shaft), (0, -shaft)]
     outline = [turn.apply(along, side / 2) for along, side in corners]
-    return (svg.polygon(points=_rounded(outline), **filled(marker.color)),)
+    return (svg.polygon(points=_rounded(outline), **area_style(marker.color)),)
 
 
 def _cube(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
     x, y, z = *sizes(marker, "x", "y"), _height(marker)
-    style = filled(marker.color)
+    style = area_style(marker.color)
     if tilt.upright:
         return (svg.rect(x=-x / 2, y=-y / 2, width=x, height=y, **style),)
     outline = box((x, y, z), tilt)
@@ -188,7 +255,7 @@ def _cube(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
 
 def _sphere(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
     x, y, z = *sizes(marker, "x", "y"), _height(marker)
-    style = filled(marker.color)
+    style = area_style(marker.color)
     if tilt.upright:
         return (svg.ellipse(rx=x / 2, ry=y / 2, **style),)
     rx, ry, yaw = ellipsoid((x, y, z), tilt)
@@ -199,7 +266,7 @@ def _sphere(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
 
 def _cylinder(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
     x, y, z = *sizes(marker, "x", "y"), _height(marker)
-    style = filled(marker.color)
+    style = area_style(marker.color)
     if tilt.upright:
         return (svg.ellipse(rx=x / 2, ry=y / 2, **style),)
     outline = cylinder((x, y, z), tilt)
@@ -211,14 +278,14 @@ def _line_strip(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
     points = _points(marker, tilt)
     if not marker.colors:
         yield svg.polyline(
-            points=_rounded(points), fill="none", **drawn(marker.color, width)
+            points=_rounded(points), fill="none", **line_style(marker.color, width)
         )
         return
     parts = (
         (_line(one, other), colour)
         for (one, other), colour in zip(pairwise(points), marker.colors, strict=False)
     )
-    yield from by_colour(parts, lambda colour: drawn(colour, width))
+    yield from by_colour(parts, lambda colour: line_style(colour, width))
 
 
 def _line_list(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
@@ -230,7 +297,7 @@ def _line_list(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
     parts = (
         (_line(points[i], points[i + 1]), each[i]) for i in range(0, len(points), 2)
     )
-    return by_colour(parts, lambda colour: drawn(colour, width))
+    return by_colour(parts, lambda colour: line_style(colour, width))
 
 
 def _triangle_list(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
@@ -244,7 +311,7 @@ def _triangle_list(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
         (_closed(points[i : i + 3]), colour)
         for i, colour in zip(range(0, len(points), 3), each[::3], strict=True)
     )
-    return by_colour(parts, filled)
+    return by_colour(parts, area_style)
 
 
 def _square_list(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
@@ -255,7 +322,7 @@ def _square_list(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
         (f"M{x - wide / 2:.3f} {y - high / 2:.3f}{square}", colour)
         for (x, y), colour in zip(_points(marker, tilt), colours(marker), strict=True)
     )
-    return by_colour(parts, filled)
+    return by_colour(parts, area_style)
 
 
 def _cube_list(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
@@ -281,7 +348,7 @@ def _sphere_list(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
         (f"M{x - rx:.3f} {y:.3f}{circle}", colour)
         for (x, y), colour in zip(_points(marker, tilt), colours(marker), strict=True)
     )
-    return by_colour(parts, filled)
+    return by_colour(parts, area_style)
 
 
 def _repeated(
@@ -292,7 +359,7 @@ def _repeated(
         (_closed([(x + dx, y + dy) for dx, dy in outline]), colour)
         for (x, y), colour in zip(_points(marker, tilt), colours(marker), strict=True)
     )
-    return by_colour(parts, filled)
+    return by_colour(parts, area_style)
 
 
 def _height(marker: MarkerMsg) -> float:
@@ -333,15 +400,15 @@ def _closed(points: list[Point]) -> str:
 
 
 _DRAWN: dict[int, Callable[[MarkerMsg, Transform], Iterable[Element]]] = {
-    kinds.ARROW: _arrow,
-    kinds.CUBE: _cube,
-    kinds.SPHERE: _sphere,
-    kinds.CYLINDER: _cylinder,
-    kinds.LINE_STRIP: _line_strip,
-    kinds.LINE_LIST: _line_list,
-    kinds.CUBE_LIST: _cube_list,
-    kinds.SPHERE_LIST: _sphere_list,
-    kinds.POINTS: _square_list,
-    kinds.TEXT_VIEW_FACING: _text,
-    kinds.TRIANGLE_LIST: _triangle_list,
+    ARROW: _arrow,
+    CUBE: _cube,
+    SPHERE: _sphere,
+    CYLINDER: _cylinder,
+    LINE_STRIP: _line_strip,
+    LINE_LIST: _line_list,
+    CUBE_LIST: _cube_list,
+    SPHERE_LIST: _sphere_list,
+    POINTS: _square_list,
+    TEXT_VIEW_FACING: _text,
+    TRIANGLE_LIST: _triangle_list,
 }

@@ -16,7 +16,7 @@ from websockets.http11 import Request, Response
 from websockets.protocol import State
 
 from webmap.base.errors import ProtocolError
-from webmap.ros.rosbridge.incoming import Incoming, ignore
+from webmap.ros.rosbridge.frame_reader import FrameReader, ignore
 from webmap.ros.rosbridge.turns import SHARE, Turn, turns
 
 MAX_WAITING = 1 << 20
@@ -35,7 +35,7 @@ The turns include the program's callbacks, which may need most of the time.
 """
 
 
-class PacedConnection(ClientConnection):
+class WebSocketConnection(ClientConnection):
     """A connection that takes turns with the others of its loop."""
 
     bytes_came = -math.inf
@@ -48,7 +48,7 @@ class PacedConnection(ClientConnection):
         self._turns.longest_rest = REST
         # The turns of several connections run in the context of one of them.
         self._context = copy_context()
-        self._incoming = Incoming(self._pass_on)
+        self._incoming = FrameReader(self._pass_on)
         self._delivers = False
         self._reading = True
         self._rests_until = 0.0

@@ -45,7 +45,7 @@ _TWO, _EIGHT = 126, 127
 """Lengths that mean that as many further bytes hold the length."""
 
 
-class Incoming:
+class FrameReader:
     """The bytes of one WebSocket that were received and not read yet.
 
     Args:

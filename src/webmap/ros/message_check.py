@@ -43,7 +43,7 @@ class Misfit(ConfigError):
         return self
 
 
-class Conformer:
+class MessageCheck:
     """Converts plain data to a message of its type, or raises :class:`Misfit`.
 
     This class is as strict as a form: absent fields stay absent, numbers are finite,

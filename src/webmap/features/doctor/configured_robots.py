@@ -10,7 +10,7 @@ from webmap.discovery.findings import ACTIONS, TopicRole
 if TYPE_CHECKING:
     from webmap import Bridge, Robot
 
-DRAWN: Mapping[str, TopicRole] = {
+ROLES: Mapping[str, TopicRole] = {
     "Battery": "battery",
     "Camera": "camera",
     "LaserScanner": "scan",
@@ -21,14 +21,14 @@ DRAWN: Mapping[str, TopicRole] = {
 
 GRIDS: tuple[TopicRole, ...] = ("map", "costmap")
 
-Made: TypeAlias = tuple[str, tuple[Any, ...], dict[str, Any]]
+ModuleArguments: TypeAlias = tuple[str, tuple[Any, ...], dict[str, Any]]
 """The name and the arguments of a module, as ``module_arguments()`` returns them."""
 
 Topics: TypeAlias = dict[TopicRole, tuple[tuple[str, str], ...]]
 
 
-def in_use(
-    robots: "Iterable[Robot]", bridge: "Bridge", maps: Iterable[Made] = ()
+def configured_robots(
+    robots: "Iterable[Robot]", bridge: "Bridge", maps: Iterable[ModuleArguments] = ()
 ) -> list[ConfiguredRobot]:
     """Return the robots that use a bridge, with the topics that they use on it.
 
@@ -38,12 +38,12 @@ def in_use(
         maps: The modules of the map that shows the robots.
     """
     grids = list(maps)
-    found = (_in_use(robot, bridge, grids) for robot in robots)
+    found = (_configured_robot(robot, bridge, grids) for robot in robots)
     return [each for each in found if each is not None]
 
 
-def _in_use(
-    robot: "Robot", bridge: "Bridge", maps: Iterable[Made]
+def _configured_robot(
+    robot: "Robot", bridge: "Bridge", maps: Iterable[ModuleArguments]
 ) -> ConfiguredRobot | None:
     feed, motion = robot.feed, robot.motion
     twist, goals = motion.config.twist, motion.config.move
@@ -71,27 +71,29 @@ def _in_use(
         topics["tf"] = ()
         if frames is not None:
             elsewhere.add("odometry")
-    topics |= _drawn(robot, bridge, maps)
+    topics |= _drawn_topics(robot, bridge, maps)
     if not any(topics[role] for role in topics if role not in GRIDS):
         return None  # the robot has at most a shared map there
     return ConfiguredRobot(robot.name, topics, base, start, frozenset(elsewhere))
 
 
-def _drawn(robot: "Robot", bridge: "Bridge", maps: Iterable[Made]) -> Topics:
+def _drawn_topics(
+    robot: "Robot", bridge: "Bridge", maps: Iterable[ModuleArguments]
+) -> Topics:
     """Return the topics drawn for a robot, including the maps that show it."""
-    roles: tuple[TopicRole, ...] = (*DRAWN.values(), *GRIDS)
+    roles: tuple[TopicRole, ...] = (*ROLES.values(), *GRIDS)
     topics: Topics = dict.fromkeys(roles, ())
     grids = list(maps)
     for name, args, options in robot.module_arguments():
-        if name in DRAWN:
-            given = inspect.signature(robot.namespace[name]).bind(
+        if name in ROLES:
+            bound = inspect.signature(robot.namespace[name]).bind(
                 robot, *args, **options
             )
-            given.apply_defaults()
-            if given.arguments.get("bridge") is bridge:
-                topic, type = (given.arguments.get(key) for key in ("topic", "type"))
+            bound.apply_defaults()
+            if bound.arguments.get("bridge") is bridge:
+                topic, type = (bound.arguments.get(key) for key in ("topic", "type"))
                 found = (str(topic), str(type or ""))
-                topics[DRAWN[name]] = (*topics[DRAWN[name]], found)
+                topics[ROLES[name]] = (*topics[ROLES[name]], found)
         elif name == "OnMaps" and args:
             grids.append((args[0], args[1:], {"robot": robot, **options}))
     for name, args, options in grids:

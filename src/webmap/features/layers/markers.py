@@ -1,26 +1,33 @@
 """Markers: shapes that ROS programs publish for people."""
 
 import asyncio
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from webmap.base.errors import ProtocolError, WebMapError
-from webmap.base.geometry import Pose
+from webmap.base.geometry import Affine, Pose, Quaternion
 from webmap.base.scope import Removal, keep
-from webmap.features.layers.markers.messages import (
+from webmap.features.layers.marker_drawing import (
     ADD,
+    CLASSES,
     DELETE,
     DELETE_ALL,
+    LETTERS,
+    TEXT_VIEW_FACING,
     MarkerArrayMsg,
     MarkerMsg,
+    draw,
+    sizes,
 )
-from webmap.features.layers.markers.shapes import look_of, place, shape_of
 from webmap.modules.declaration import TopicKind, layer
+from webmap.modules.drawing import check_finite, flat, in_space
 from webmap.modules.layer_frames import LayerFrames, not_known
 from webmap.modules.map_layer import MapLayer
 from webmap.ros.tf import Transform, TransformError
+from webmap.scene import svg
 from webmap.scene.element import Element
 
 Put = Callable[[Transform], object]
@@ -184,7 +191,7 @@ class Markers(MapLayer):
         """Prepare the layer; there are no markers yet."""
         self.shapes: dict[Key, Element] = {}
         """The drawn markers, by namespace and number."""
-        self._looks: dict[Key, tuple[object, ...]] = {}
+        self._appearances: dict[Key, tuple[object, ...]] = {}
         self._ends: dict[Key, float] = {}
         self._timer: asyncio.TimerHandle | None = None
         self._left_out: set[Key] = set()
@@ -306,12 +313,12 @@ class Markers(MapLayer):
 
     def _show(self, key: Key, marker: MarkerMsg, frame: Transform) -> None:
         """Place a marker, and draw it again if it looks different from above."""
-        before, look = self.shapes.get(key), look_of(marker, frame)
-        if before is not None and self._looks[key] == look:
+        before, look = self.shapes.get(key), appearance(marker, frame)
+        if before is not None and self._appearances[key] == look:
             place(before, marker, frame)
         else:
             self._draw(key, before, shape_of(marker, frame), marker)
-            self._looks[key] = look
+            self._appearances[key] = look
 
     def _draw(
         self, key: Key, before: Element | None, shape: Element, marker: MarkerMsg
@@ -327,7 +334,7 @@ class Markers(MapLayer):
 
     def _drop(self, key: Key) -> None:
         shape = self.shapes.pop(key, None)
-        self._looks.pop(key, None)
+        self._appearances.pop(key, None)
         self._ends.pop(key, None)
         self.frames.forget(key)
         if shape is not None:
@@ -360,3 +367,94 @@ class Markers(MapLayer):
 
 def _wrong(marker: MarkerMsg, error: WebMapError) -> str:
     return f"marker {marker.id} of {marker.ns[:LONGEST_NAME]!r}: {error}"
+
+
+MAX_POINTS = 20_000
+"""Greatest number of points of one marker."""
+
+DECIMALS = 3
+"""Decimals of a rotation that decide whether a tilting marker is drawn again."""
+
+IDENTITY = Transform()
+"""The identity: draws a marker with its own coordinates."""
+
+
+def shape_of(marker: MarkerMsg, frame: Transform = IDENTITY) -> Element:
+    """Return a marker as a group at its pose, seen from above.
+
+    Args:
+        marker: The marker.
+        frame: See :func:`place`.
+
+    Raises:
+        ProtocolError: If its type cannot be drawn, or a number is not valid.
+    """
+    name = CLASSES.get(marker.type)
+    if name is None:
+        raise ProtocolError(f"markers of type {marker.type} are not drawn")
+    if len(marker.points) > MAX_POINTS:
+        raise ProtocolError(
+            f"it has {len(marker.points)} points; the limit is {MAX_POINTS}"
+        )
+    if marker.colors and len(marker.colors) != len(marker.points):
+        raise ProtocolError(
+            f"it has {len(marker.colors)} colours for {len(marker.points)} points"
+        )
+    group = svg.g(class_=f"marker {name}")
+    place(group, marker, frame)
+    group.append(*draw(marker, _split(marker, frame)[1]))
+    return group
+
+
+def appearance(marker: MarkerMsg, frame: Transform = IDENTITY) -> tuple[object, ...]:
+    """Return all values that a marker's shape depends on, except its position.
+
+    Args:
+        marker: The marker.
+        frame: See :func:`place`.
+
+    Raises:
+        ProtocolError: If its pose is not valid.
+    """
+    m = marker
+    q = _split(m, frame)[1].rotation
+    sign = math.copysign(1.0, q.w)  # both signs are the same rotation
+    tilt = (round(sign * part, DECIMALS) + 0.0 for part in (q.x, q.y, q.z, q.w))
+    return (m.type, m.scale, m.color, m.points, m.colors, m.text, *tilt)
+
+
+def place(shape: Element, marker: MarkerMsg, frame: Transform = IDENTITY) -> None:
+    """Place an already drawn shape at its marker's pose.
+
+    Args:
+        shape: The shape.
+        marker: The shape's marker.
+        frame: The transform from the marker's frame to the map.
+
+    Raises:
+        ProtocolError: If its pose is not valid.
+    """
+    at, _ = _split(marker, frame)
+    if marker.type == TEXT_VIEW_FACING:
+        # y points up in the world, and down in letters.
+        size = sizes(marker, "z")[0] / LETTERS
+        shape.set_matrix(Affine(size, 0, 0, -size, at.x, at.y))
+    else:
+        shape.set_pose(at.x, at.y, at.yaw)
+
+
+def _split(marker: MarkerMsg, frame: Transform) -> tuple[Pose, Transform]:
+    """Return the marker's pose in the plane, and its tilt there."""
+    if marker.type == TEXT_VIEW_FACING:
+        # The orientation of this type has no meaning, and is often not set.
+        at = marker.pose.position
+        check_finite([(at.x, at.y)], "the place of a text")
+        (found,) = flat(in_space([at]), frame)
+        return Pose(*found), Transform()
+    (place,) = in_space([marker.pose.position])
+    _ = marker.pose.usable
+    q = marker.pose.orientation.quaternion
+    n = q.norm
+    turn = Quaternion(q.x / n, q.y / n, q.z / n, q.w / n)
+    pose, tilt = (frame @ Transform(place, turn)).heading_and_tilt
+    return pose, Transform(rotation=tilt.rotation)
