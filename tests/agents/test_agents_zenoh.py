@@ -347,6 +347,7 @@ def test_a_self_signed_certificate_that_zenoh_refuses_is_no_wrong_password(users
             peer.close()
 
 
+@pytest.mark.slow
 def test_a_closed_peer_leaves_no_thread_inside_zenoh():
     with socket.create_server(("127.0.0.1", 0)) as silent:
         peer = Peer(f"tcp/127.0.0.1:{silent.getsockname()[1]}", RouterUser())

@@ -23,6 +23,8 @@ from webmap.fleet.agent import (
 )
 from webmap.ros.temporary_bridge import ask_topics
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("zenoh")
 
 ROUTER = ("--router", "zenoh://127.0.0.1:1")

@@ -15,6 +15,8 @@ from equipment.camera_server import CameraServer
 from equipment.webmap_process import simulator, webmap
 from webmap.base.tasks import LoopThread
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("zenoh")
 
 FLEET = """

@@ -21,6 +21,8 @@ from webmap.agents.peer import Peer, close_peers, peer_of
 from webmap.agents.router_access import RouterUser
 from webmap.ros.rosbridge import ops
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("zenoh")
 
 OPTIONS = ("--port", "0", "--no-browser")

@@ -150,6 +150,7 @@ def view(*arguments):
     return run_inside("view", *arguments)
 
 
+@pytest.mark.slow
 def test_view_show_lists_the_settings_and_refuses_settings_for_unknown_robots(ros1):
     shown = view(
         *(ros1, "--show", "--set", "robot_1.scan=/robot_0/base_scan"),

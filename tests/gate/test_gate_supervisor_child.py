@@ -153,6 +153,7 @@ def test_a_process_that_sends_invalid_data_is_killed(run, caplog):
     assert "a message of 4294967295 bytes" in caplog.text
 
 
+@pytest.mark.slow
 def test_a_process_whose_message_raises_an_error_is_killed(run, caplog):
     data = pipe.pack(Ready(5)).hex()
     code = f"import os, time; os.write(1, bytes.fromhex('{data}')); time.sleep(600)"

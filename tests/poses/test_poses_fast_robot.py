@@ -3,6 +3,8 @@
 import asyncio
 import time
 
+import pytest
+
 from equipment.fake_rosbridge import bridged, until
 from webmap import Robot
 from webmap.poses.frames import PERIOD
@@ -58,6 +60,7 @@ def counted(robot: Robot, monkeypatch) -> list[float]:
     return drawn
 
 
+@pytest.mark.slow
 def test_odometry_at_1_khz_is_requested_and_drawn_ten_times_a_second(monkeypatch):
     async def scenario() -> None:
         async with bridged() as (server, bridge):
@@ -76,6 +79,7 @@ def test_odometry_at_1_khz_is_requested_and_drawn_ten_times_a_second(monkeypatch
     asyncio.run(scenario())
 
 
+@pytest.mark.slow
 def test_frames_at_1_khz_move_the_robot_twenty_times_a_second(monkeypatch):
     async def scenario() -> None:
         async with bridged() as (server, bridge):

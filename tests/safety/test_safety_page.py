@@ -3,6 +3,7 @@
 import ast
 import re
 
+import pytest
 from safety_figures import DOCS, Figure
 from safety_promises import PAGE as FILE
 from safety_promises import (
@@ -30,6 +31,7 @@ def functions():
     }
 
 
+@pytest.mark.slow
 def test_every_test_named_in_the_safety_document_exists():
     named = set(re.findall(r"`(test_\w+)`", PAGE))
     assert len(named) > 30, "the page names hardly any test"
@@ -57,6 +59,7 @@ def test_every_promise_names_a_test_and_no_promise_is_missing():
     assert without == []
 
 
+@pytest.mark.slow
 def test_the_table_shows_every_promise_with_its_newest_figure_and_its_test():
     assert sorted({promise.number for promise in PROMISES}) == NUMBERS
     assert {promise.shown_by for promise in PROMISES} - functions() == set()

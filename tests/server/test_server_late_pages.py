@@ -6,6 +6,7 @@ import threading
 import weakref
 from types import SimpleNamespace
 
+import pytest
 from page_loop import begin_page, make_model, open_page, wait_for
 
 import webmap
@@ -133,6 +134,7 @@ def test_at_the_page_limit_the_page_that_was_lost_first_is_removed(loop):
     loop.call(lambda: model.close() or True)
 
 
+@pytest.mark.slow
 def test_the_number_of_lost_pages_with_new_ids_is_limited(loop):
     built, closed, hosts = [], [], weakref.WeakSet()
 

@@ -19,6 +19,7 @@ def grace(monkeypatch):
     audience.end()
 
 
+@pytest.mark.slow
 def test_few_messages_come_without_a_page_and_the_first_frames_are_fresh(loop, grace):
     with simulator("--robots", "2") as url:
         bridge = webmap.Bridge(url)
