@@ -110,3 +110,9 @@ def test_a_singular_affine_map_has_no_inverse():
 def test_a_scale_must_be_a_number_above_zero(factor):
     with pytest.raises(ValueError, match="above 0"):
         Affine.scaling(factor)
+
+
+def test_a_pose_gives_the_transforms_out_of_its_frame_and_into_it():
+    pose = Pose(2.0, -3.0, 0.7)
+    assert Affine.into_pose(pose) == Affine.of_pose(pose).inverse
+    assert Affine.into_pose(pose).apply(2.0, -3.0) == pytest.approx((0.0, 0.0))

@@ -156,6 +156,21 @@ def test_a_buffer_keeps_ten_seconds_of_transforms():
         buffer.lookup("odom", "base", 19.0)
 
 
+@pytest.mark.parametrize("carrier", ["base_link", "laser", "odom", "map", "post"])
+def test_a_sensor_and_what_carries_it_are_found_as_if_one_by_one(robot, carrier):
+    robot.add("map", "post", at(7.0), 0.0, static=True)
+    for target, source in (("map", "laser"), ("post", "laser"), ("laser", "map")):
+        both = robot.lookup_carried(target, source, carrier, 11.05)
+        one = robot.lookup(target, source, 11.05)
+        assert both == (one, robot.find(target, carrier, 11.05).transform)
+
+
+def test_an_unknown_carrier_is_none_and_an_unknown_sensor_an_error(robot):
+    assert robot.lookup_carried("map", "laser", "trailer", 11.0)[1] is None
+    with pytest.raises(NotKnownThen):
+        robot.lookup_carried("map", "laser", "base_link", 99.0)
+
+
 def test_find_uses_the_given_time_or_else_the_newest_transform(robot):
     then, now = robot.find("map", "base_link", 11.0), robot.find("map", "base_link")
     assert place(then.transform) == (101.0, 0.0)
