@@ -28,7 +28,7 @@ def test_the_page_shows_preparing_input_until_teleop_is_loaded(chromium, demo):
     context = chromium.new_context(viewport={"width": 1280, "height": 800})
     page = context.new_page()
     page.route(
-        "**/drive/teleop.js*",
+        "**/web/drive.js*",
         lambda r: r.continue_() if come.is_set() else held.append(r),
     )
     page.goto(demo.url, wait_until="commit")
