@@ -212,7 +212,9 @@ def with_layers(
     """
     frames = None if config.tf is None else msgspec.structs.asdict(config.tf)
     scans, modules = list(config.scan), list(config.modules)
-    taken = {topic_of(layer.module) for layer in config.layers()}
+    # A battery is shown as a number: a layer may draw its topic too.
+    drawn_now = (each.module for each in config.layers())
+    taken = {topic_of(each) for each in drawn_now if each.name != "Battery"}
     if config.odometry is not None:
         taken.add(normalise_topic(config.odometry.topic))
     for layer in layers:

@@ -14,12 +14,14 @@ from tilted_frames import frame
 
 from webmap import Bridge, Map
 from webmap.base.errors import ConfigError
+from webmap.config.robot import RobotConfig
 from webmap.console import Console
 from webmap.core.layer import Layer
 from webmap.core.registry import map_modules, robot_modules
 from webmap.discovery import discover
+from webmap.discovery.findings import FoundLayer
 from webmap.discovery.fleet_toml import fleet_toml
-from webmap.discovery.layers import find_layers
+from webmap.discovery.layers import find_layers, with_layers
 from webmap.features.view.view import all_layers
 from webmap.fleet.periodic_search import LayerSearch
 from webmap.fleet.robot_options import Candidate
@@ -115,6 +117,14 @@ def test_found_layers_are_added_and_a_shared_layer_only_once():
     assert console._more == [("Zones", (bridge, "/zones"), {})]
     for robot in console.robots:
         robot.destroy()
+
+
+def test_a_custom_layer_may_draw_the_topic_of_the_battery():
+    topic = "/a/battery_state"
+    config = RobotConfig(name="a", bridge="hall", battery=topic)
+    found = FoundLayer("temperature", topic, "sensor_msgs/BatteryState")
+    (module,) = with_layers(config, [found, found], "/a").modules
+    assert module.name == "Temperature"
 
 
 def test_a_shared_custom_layer_is_added_on_a_floor_plan():
