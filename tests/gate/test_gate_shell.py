@@ -88,10 +88,18 @@ class Running:
         await until(lambda: (r := self.report()) is not None and check(r), what)
 
     async def drive_off(self, bridge):
-        await self.reported(lambda r: r.armable, "a free robot")
-        self.send(op="take", robot="r1")
-        self.x = 1.0
-        await until(lambda: any(speeds(bridge)), "motion")
+        """Drive; on a busy machine the gate may end control, so take it again then."""
+        deadline = asyncio.get_running_loop().time() + 30.0
+        while not any(speeds(bridge)):
+            assert asyncio.get_running_loop().time() < deadline, "no motion"
+            await self.reported(lambda r: r.armable or r.holder, "a robot to drive")
+            if self.report().holder is None:
+                self.send(op="take", robot="r1")
+            self.x = 1.0
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(1.0):
+                    while not any(speeds(bridge)):
+                        await asyncio.sleep(0.005)
 
 
 def speeds(bridge):
