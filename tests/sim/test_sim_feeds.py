@@ -377,7 +377,7 @@ def test_a_sonar_measures_the_wall_and_robots_in_its_cone():
 
 
 def test_a_gps_fix_matches_the_pose_of_the_robot():
-    from webmap.base.geometry import LocalPlane
+    from webmap.base.local_plane import LocalPlane
     from webmap.sim.feeds.localization import DATUM
 
     bench = Bench(robots=1)

@@ -12,7 +12,7 @@ import msgspec
 import webmap
 from webmap import console
 from webmap.base.errors import ConfigError, WebMapError
-from webmap.base.geometry import LocalPlane
+from webmap.base.local_plane import LocalPlane
 from webmap.base.map_file import read_map
 from webmap.config.checks import KeyPath, Mistakes, WrongConfig
 from webmap.config.fleet import FleetConfig, ImageConfig, TilesConfig, read_fleet

@@ -12,7 +12,8 @@ from scene_of_tiles import DATUM, EAST, FIXES, colour, made_tiles, missing, numb
 
 from equipment.chromium import watched_tab
 from equipment.webmap_process import page_of
-from webmap.base.geometry import Affine, LocalPlane
+from webmap.base.geometry import Affine
+from webmap.base.local_plane import LocalPlane
 
 pytestmark = pytest.mark.browser
 

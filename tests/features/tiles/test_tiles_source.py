@@ -11,7 +11,8 @@ import pytest
 from PIL import Image
 
 from webmap.base.errors import ConfigError
-from webmap.base.geometry import Affine, LocalPlane
+from webmap.base.geometry import Affine
+from webmap.base.local_plane import LocalPlane
 from webmap.features.tiles.tile_layer import TileGrid
 from webmap.features.tiles.tile_source import (
     FolderTiles,

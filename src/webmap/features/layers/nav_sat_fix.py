@@ -6,7 +6,8 @@ import time
 import msgspec
 
 from webmap.base.errors import ConfigError, ProtocolError
-from webmap.base.geometry import FARTHEST, LocalPlane
+from webmap.base.geometry import FARTHEST
+from webmap.base.local_plane import LocalPlane
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.robot_layer import RobotLayer
 from webmap.ros.messages import Stamped

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from webmap.base.errors import ConfigError
-from webmap.base.geometry import PLANE_RADIUS, Affine, LocalPlane
+from webmap.base.geometry import Affine
+from webmap.base.local_plane import PLANE_RADIUS, LocalPlane
 from webmap.base.scope import Removal, keep
 from webmap.base.tasks import spawn
 from webmap.core.pictures import pictures
