@@ -29,10 +29,10 @@ napoleon_numpy_docstring = False
 nitpick_ignore_regex = [
     ("py:.*", r"(?!webmap\b).*"),
     # Types in signatures that programs neither make nor keep.
-    ("py:class", r"webmap\.core\.page\.PageEntry"),
+    ("py:class", r"webmap\.core\.base_page\.(BasePage|PageEntry)"),
     ("py:class", r"webmap\.core\.pictures\.Publisher"),
     ("py:class", r"webmap\.scene\.wire\.session\.SceneSession"),
-    ("py:class", r"webmap\.core\.given_pose\.(Position|Orientation)"),
+    ("py:class", r"webmap\.base\.geometry\.(Position|Orientation)"),
     ("py:class", r"webmap\.scene\.(node\.Node|live\.(Live|Rays))"),
     ("py:class", r"webmap(\.\w+)+\.[A-Z]"),  # type variables
 ]
