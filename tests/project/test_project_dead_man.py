@@ -39,9 +39,15 @@ def test_a_text_has_the_dead_man_time_of_the_gate(file: str, pattern: str) -> No
     assert seconds == DEADMAN
 
 
-def test_the_promised_times_allow_for_the_dead_man_time() -> None:
-    safety = " ".join((ROOT / "docs" / "safety.md").read_text("utf-8").split())
-    (sent,) = re.findall(
-        r"accepts no more commands, it sends zero within (\d+) ms", safety
-    )
+PROMISES = [
+    ("docs/safety.md", r"accepts no more commands, it sends zero within (\d+) ms"),
+    ("docs/explanation/design.md", r"Zero leaves the gate at most (\d+) ms after"),
+]
+"""The places that promise when a zero leaves the gate, in milliseconds."""
+
+
+@pytest.mark.parametrize(("file", "pattern"), PROMISES)
+def test_a_promised_time_allows_for_the_dead_man_time(file: str, pattern: str) -> None:
+    text = " ".join((ROOT / file).read_text("utf-8").split())
+    (sent,) = re.findall(pattern, text)
     assert int(sent) / 1000 >= DEADMAN + 2 * STEP

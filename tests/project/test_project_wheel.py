@@ -35,6 +35,13 @@ def built(kind: str, folder: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
+def sdist(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
+    """Return the names of the files in an sdist of this checkout."""
+    with tarfile.open(built("sdist", tmp_path_factory.mktemp("sdist"))) as archive:
+        return {name.partition("/")[2] for name in archive.getnames()}
+
+
+@pytest.fixture(scope="session")
 def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of the commands of a new environment with the wheel."""
     folder = tmp_path_factory.mktemp("a path with spaces") / "environment"
@@ -68,17 +75,19 @@ INCLUDED = re.compile(r"^```\{(?:literal)?include\} (\S+)$", re.M)
 
 
 def test_the_sdist_contains_every_file_that_the_documentation_includes(
-    tmp_path: Path,
+    sdist: set[str],
 ) -> None:
-    with tarfile.open(built("sdist", tmp_path)) as archive:
-        there = {name.partition("/")[2] for name in archive.getnames()}
     wanted = {
         (page.parent / name).resolve().relative_to(ROOT).as_posix()
         for page in (ROOT / "docs").rglob("*.md")
         for name in INCLUDED.findall(page.read_text("utf-8"))
     }
     assert {"CONTRIBUTING.md", "examples/simple/simple.py"} <= wanted
-    assert wanted <= there
+    assert wanted <= sdist
+
+
+def test_the_sdist_contains_every_text_of_the_project(sdist: set[str]) -> None:
+    assert {path.name for path in ROOT.glob("*.md")} <= sdist
 
 
 def test_the_package_description_links_to_pages_that_the_documentation_has(

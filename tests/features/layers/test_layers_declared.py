@@ -214,6 +214,12 @@ PRIVATE = {
 PUBLIC_MODULES = ("drawing", "geometry", "html", "messages", "options", "svg")
 
 
+def test_no_two_built_in_layers_have_the_same_rank():
+    ranks = [each.rank for each in declarations() if each.built_in]
+    assert len(set(ranks)) == len(ranks)
+    assert not [rank for rank in ranks if rank % 10]
+
+
 @pytest.mark.parametrize("declared", declarations(), ids=lambda each: each.name)
 def test_built_in_layers_import_only_public_or_listed_names(declared):
     if not declared.built_in:

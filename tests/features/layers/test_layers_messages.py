@@ -1,9 +1,11 @@
 """The views of the modules' messages, also with the worker for large frames."""
 
 import json
+from collections.abc import Mapping
 
 import pytest
 from module_fakes import header, pose
+from test_layers_absurd import SCAN
 from test_layers_cloud import POINTS, cloud
 from test_layers_fix import fix
 from test_layers_grid import CORNERS, grid, update
@@ -18,7 +20,8 @@ from webmap.base.errors import ConfigError, ProtocolError
 from webmap.core.layer import Layer
 from webmap.features.layers.diagnostics import DiagnosticArrayMsg
 from webmap.features.layers.grid_cells import GridCellsMsg
-from webmap.features.layers.marker_drawing import MarkerArrayMsg
+from webmap.features.layers.laser_scanner import SweepMsg
+from webmap.features.layers.marker_drawing import MarkerArrayMsg, MarkerMsg
 from webmap.features.layers.nav_sat_fix import NavSatFixMsg
 from webmap.features.layers.occupancy_grid import OccupancyGridUpdateMsg
 from webmap.features.layers.point_cloud import PointCloud2Msg
@@ -27,7 +30,8 @@ from webmap.features.layers.polygon import PolygonStampedMsg
 from webmap.features.layers.pose_array import ParticleCloudMsg, PoseArrayMsg
 from webmap.features.layers.pose_with_covariance import UncertainPoseStampedMsg
 from webmap.features.layers.range import RangeMsg
-from webmap.ros.messages import OccupancyGridMsg, PathMsg
+from webmap.modules.declaration import declarations
+from webmap.ros.messages import OccupancyGridMsg, PathMsg, PoseStampedMsg
 from webmap.ros.offload import values
 from webmap.ros.rosbridge.events import Publish
 from webmap.ros.worker import WorkRequest, answer, view_name
@@ -35,6 +39,7 @@ from webmap.ros.worker import WorkRequest, answer, view_name
 MESSAGES = {
     OccupancyGridMsg: grid(CORNERS),
     OccupancyGridUpdateMsg: update(0, 0, CORNERS),
+    SweepMsg: SCAN,
     PathMsg: path([(1, 2), (3, 4)]),
     PoseArrayMsg: {"header": header(), "poses": [pose(1, 2)]},
     ParticleCloudMsg: {
@@ -43,14 +48,22 @@ MESSAGES = {
     },
     UncertainPoseStampedMsg: doubtful(pose(1, 2), covariance(1, 1)),
     PolygonStampedMsg: polygon(FOOT),
+    PoseStampedMsg: {"header": header(), "pose": pose(1, 2)},
     RangeMsg: sonar(1.0),
     PointStampedMsg: point(1, 2),
     GridCellsMsg: cells([(1, 2), (3, 4)]),
     PointCloud2Msg: cloud(POINTS),
     MarkerArrayMsg: {"markers": [marker(CUBE)]},
+    MarkerMsg: marker(CUBE),
     DiagnosticArrayMsg: array(status("one", 1)),
     NavSatFixMsg: fix(50, 14),
 }
+
+
+@pytest.mark.parametrize("layer", declarations(), ids=lambda layer: layer.name)
+def test_every_view_of_a_built_in_layer_has_an_example(layer):
+    views = layer.view.values() if isinstance(layer.view, Mapping) else [layer.view]
+    assert not layer.built_in or set(views) <= MESSAGES.keys()
 
 
 @pytest.mark.parametrize("view", MESSAGES, ids=lambda view: view.__name__)
