@@ -76,6 +76,7 @@ def bay1(router, folder):
         yield address
 
 
+@pytest.mark.serial  # it measures rates
 def test_doctor_checks_the_only_agent_of_a_router(router, bay1):
     result = webmap("doctor", router, "--seconds", "1", "--try-call")
     assert result.returncode == 0, result.stdout + result.stderr

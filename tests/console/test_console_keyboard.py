@@ -156,6 +156,7 @@ def test_the_view_the_layers_and_the_help_need_no_mouse(open_console):
     page.keyboard.press("Escape")
     expect(page.get_by_role("dialog", name="Keys and gestures")).to_be_hidden()
     find(page, "list of robots")
+    expect(page.locator("#panel-turn")).to_be_focused()
     expect(page.locator("#panel")).to_be_hidden()
     find(page, "list of robots")
     expect(page.locator("#panel")).to_be_visible()

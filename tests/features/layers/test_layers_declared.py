@@ -209,6 +209,7 @@ PRIVATE = {
     "OccupancyGrid": {"MessageProblems", "spawn"},
     # Names that only these layers use.
     "LaserScanner": {"Rays", "scan_name"},
+    "NavSatFix": {"LocalPlane"},
     "Polygon": {"check_items"},
 }
 PUBLIC_MODULES = ("drawing", "geometry", "html", "messages", "options", "svg")

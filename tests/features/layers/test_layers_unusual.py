@@ -23,6 +23,7 @@ def lethal(layer) -> list[tuple[int, int]]:
     return list(zip(columns.tolist(), rows.tolist(), strict=True))
 
 
+@pytest.mark.serial  # messages come within half a second
 def test_updates_that_overtake_a_grid_in_the_throttle_are_drawn_on_it(map, page):
     async def scenario():
         bridge = Bridge("ws://127.0.0.1:9")  # it is not connected
