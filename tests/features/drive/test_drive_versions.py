@@ -17,7 +17,7 @@ from webmap.gate.protocol import RobotReport, RobotSpec
 from webmap.ros.rosbridge.server.dialect import REAL, dialect_of
 from webmap.ros.temporary_bridge import TemporaryBridge
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.serial]  # it drives in real time
 
 ACTIONS = {
     "ros1": ("move_base", "move_base_msgs/MoveBaseAction"),
