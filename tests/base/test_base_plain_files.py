@@ -94,6 +94,7 @@ def test_yaml_errors_name_the_line_of_the_value(tmp_path):
     assert lines == ["2", "4", "5", "2"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -161,6 +162,7 @@ def test_a_file_that_webmap_keeps_is_private_and_no_link(tmp_path):
         read_file(tmp_path / "b", 3, links=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "words"),
     [

@@ -469,6 +469,7 @@ class TestConfirmation:
         watch_it(seen, 0.2, 0.0)
         assert seen.report().stop.confirmed is True
 
+    @pytest.mark.slow
     def test_later_silence_or_motion_revokes_the_confirmation_of_a_stop(self, seen):
         """The cause may be a late goal, a ramp or another program."""
         stop(seen)

@@ -165,6 +165,7 @@ class TestAlarm:
         self.run(bench, 0.6, 0.0, x=0.0)
         assert bench.report().alarm is None
 
+    @pytest.mark.slow
     def test_an_alarm_ends_after_a_minute_without_odometry_and_returns_with_motion(
         self, bench
     ):

@@ -30,6 +30,7 @@ def held(bench):
     return bench.report().holder is not None
 
 
+@pytest.mark.slow
 def test_an_unused_lease_expires_after_120_s_with_a_reason_for_its_holder(
     bench, monkeypatch
 ):
@@ -56,6 +57,7 @@ def test_commands_with_an_expired_lease_do_not_move_the_robot(bench):
     assert bench.moving_since(at) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("act", ["drives", "goal", "locate", "renew", "deny"])
 def test_every_use_of_the_lease_restarts_its_expiry_time(bench, act):
     bench.hold(UNUSED - 2.0)

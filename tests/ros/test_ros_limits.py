@@ -88,6 +88,7 @@ def test_a_too_large_message_is_reported_to_its_subscriber_and_logged_once(caplo
     assert len(lines) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("binary", [False, True])
 def test_a_map_of_any_size_costs_neither_the_connection_nor_memory(binary, caplog):
     """Such a map is latched: the bridge would send it again on each new connection."""

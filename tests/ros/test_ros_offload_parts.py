@@ -84,6 +84,7 @@ LONG = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("view", LONG, ids=lambda view: view.__name__)
 def test_a_long_message_is_decoded_completely_and_in_order(view):
     field, topic, frame = LONG[view]
@@ -109,6 +110,7 @@ def test_a_long_message_is_decoded_completely_and_in_order(view):
     run(scenario)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("view", LONG, ids=lambda view: view.__name__)
 def test_no_decoding_step_of_a_long_message_blocks_the_event_loop(view):
     """Measure the steps of all tasks of this thread in processor time.

@@ -342,6 +342,7 @@ def test_any_bytes_after_a_good_head_give_a_value_or_a_protocol_error(tail):
     try_all(b"\xa3bopgpublishetopicb/acmsg" + tail)
 
 
+@pytest.mark.slow
 @given(operations)
 @settings(max_examples=300, deadline=None)
 def test_any_operation_gives_a_valid_or_a_malformed_event(operation):

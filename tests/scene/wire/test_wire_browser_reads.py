@@ -57,6 +57,7 @@ def decoder():
     decoder.close()
 
 
+@pytest.mark.slow
 @given(histories)
 @settings(max_examples=150)
 def test_the_browser_decoder_builds_the_same_tree_for_any_scene_history(
