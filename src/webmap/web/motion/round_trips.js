@@ -128,7 +128,7 @@ export class RoundTrip {
  * The loops from this page to the gates: the display's own gate, and the gates of agents.
  *
  * Each gate sends its own ticks, and acknowledges the commands to its robots. Their reports
- * tell which gate each robot has. Times are in milliseconds of the caller's clock.
+ * know the gate of each robot. Times are in milliseconds of the caller's clock.
  */
 export class RoundTrips {
   constructor() {
