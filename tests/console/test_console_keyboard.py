@@ -162,6 +162,19 @@ def test_the_view_the_layers_and_the_help_need_no_mouse(open_console):
     expect(page.locator("#panel")).to_be_visible()
 
 
+def test_help_that_closes_does_not_take_the_focus_from_the_palette(open_console):
+    page = open_console()
+    find(page, "help")
+    page.evaluate(
+        """() => {
+          document.querySelector("#help").close();
+          document.querySelector("#palette-open").click();
+        }"""
+    )
+    expect(page.locator("#help-open")).to_have_attribute("aria-expanded", "false")
+    expect(page.locator("#palette-field")).to_be_focused()
+
+
 def test_a_pose_is_set_with_arrow_keys(open_console):
     page = open_console()
     select(page, "robot 1")

@@ -126,7 +126,8 @@ function listenToHelp(drive, signal) {
   };
   const closed = () => {
     byId("help-open").setAttribute("aria-expanded", "false");
-    byId("help-open").focus();
+    // The event comes late on a busy page: the operator may be typing elsewhere.
+    if (document.activeElement === document.body) byId("help-open").focus();
   };
   help.addEventListener("close", closed, { signal });
   byId("help-open").addEventListener("click", turn, { signal });
