@@ -14,6 +14,8 @@ from webmap.agents.router import free_port, read_users, router_settings
 from webmap.agents.router_access import RouterUser, zenoh_config
 from webmap.base.errors import WireError
 
+pytestmark = pytest.mark.slow
+
 zenoh = pytest.importorskip("zenoh")
 
 TLS = Path(__file__).with_name("tls")

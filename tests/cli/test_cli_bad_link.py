@@ -11,6 +11,8 @@ import pytest
 from equipment.command_line import run_inside
 from webmap.cli import demo
 
+pytestmark = pytest.mark.slow
+
 
 @contextmanager
 def echo():

@@ -27,6 +27,8 @@ from webmap.gate.lanes import sockets
 from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.sockets import Socket, open_socket
 
+pytestmark = pytest.mark.slow
+
 
 async def opened(url, seen):
     return await open_socket(url, seen.handlers, Budget())

@@ -21,6 +21,8 @@ from webmap.gate.events import Key
 from webmap.gate.locks import Locks
 from webmap.gate.rules.motion import ZERO
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def stored(state_folder):

@@ -2,6 +2,7 @@
 
 import json
 
+import pytest
 from link_bench import in_loop, noting_bridge, until
 
 from equipment.gate_harness import spec
@@ -14,6 +15,8 @@ from webmap.gate.lanes.tasks import (
     goal_topics,
     hook_topics,
 )
+
+pytestmark = pytest.mark.slow
 
 MOVE_BASE = spec(
     action="/move_base", action_type="move_base_msgs/MoveBaseAction", cancel_topic=None

@@ -25,6 +25,8 @@ from webmap.ros.rosbridge.wire_subscription import (
     TopicSilence,
 )
 
+pytestmark = pytest.mark.slow
+
 MAP = "nav_msgs/OccupancyGrid"
 LIMIT = 5000
 

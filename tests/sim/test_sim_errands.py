@@ -10,6 +10,8 @@ from webmap.sim.maps import FLOOR, load_map
 from webmap.sim.navigator import QUIET, REST
 from webmap.sim.world import LOW_CHARGE, World, WorldOptions
 
+pytestmark = pytest.mark.slow
+
 FREE, BUSY = 0, 1
 PLAN = load_map(FLOOR)
 

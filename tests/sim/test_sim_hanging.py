@@ -15,6 +15,8 @@ from webmap.ros.rosbridge.server.graph import Graph
 from webmap.ros.rosbridge.server.schema import Schema
 from webmap.ros.rosbridge.server.server import RosbridgeServer
 
+pytestmark = pytest.mark.slow
+
 TYPE = "std_msgs/String"
 TOPIC = "/latched"
 

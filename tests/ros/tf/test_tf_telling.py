@@ -9,6 +9,8 @@ from test_tf_robot import Link, transform
 from webmap import Robot
 from webmap.poses.frames import PERIOD, frames_of
 
+pytestmark = pytest.mark.slow
+
 
 class OpenLink(Link):
     """A link that is up."""
