@@ -7,9 +7,9 @@ import threading
 import time
 from pathlib import Path
 
-from webmap.base.tasks import spawn
 from webmap.core.base_page import PageEntry, Viewer
 from webmap.core.runtime import Runtime
+from webmap.scene.node import frame_request
 from webmap.server.files import Published
 from webmap.server.open_pages import OpenPages
 
@@ -40,10 +40,10 @@ class Loop:
             runtime._loop = asyncio.get_running_loop()
             runtime._thread = self.thread
             self.over = asyncio.Event()
-            ticking = spawn(runtime._tick_on())
+            frame_request.listen(runtime._on_change)
             self.ready.set()
             await self.over.wait()
-            ticking.cancel()
+            frame_request.listen(None)
 
         asyncio.run(live())
 

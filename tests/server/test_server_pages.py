@@ -3,6 +3,8 @@
 import asyncio
 import gc
 import json
+import math
+import time
 
 import pytest
 from page_loop import ANN, HELLO, make_model, objects_left, open_page, wait_for
@@ -12,6 +14,7 @@ from webmap.base.errors import MotionError
 from webmap.base.scope import Removal, keep
 from webmap.core.base_page import Viewer
 from webmap.core.layer import Layer
+from webmap.core.runtime import FramePace
 from webmap.features.layers.laser_scanner import LaserScanner, SweepMsg
 from webmap.ros.rosbridge.events import Publish
 from webmap.server import open_pages as host_module
@@ -43,20 +46,59 @@ def test_the_first_picture_of_a_page_waits_for_no_tick(loop, monkeypatch):
     loop.call(lambda: model.close() or True)
 
 
-def test_a_page_gets_as_many_frames_as_the_frame_rate_allows(loop, monkeypatch):
-    slept, sleep = [], asyncio.sleep
+def test_a_change_is_sent_at_once_and_the_next_one_when_the_rate_allows(
+    loop, monkeypatch
+):
+    monkeypatch.setattr(loop.runtime, "frame_rate", 1 / 60)
+    robot = webmap.Robot("r")
 
-    def note(seconds):
-        slept.append(seconds)
-        return sleep(0)
+    def build(page):
+        webmap.Map(page.element("map")).add_robot(robot)
 
-    monkeypatch.setattr(loop.runtime, "frame_rate", 4.0)
-    monkeypatch.setattr("webmap.core.runtime.asyncio.sleep", note)
-    model = make_model(loop, lambda page: webmap.Map(page.element("map")))
-    open_page(model)
-    wait_for(lambda: len(slept) > 1)
+    model = make_model(loop, build)
+    _, socket = open_page(model)
+    assert len(socket.frames) == 1
+    for sent in (2, 2):
+        loop.call(lambda: robot.svg.set("data-x", str(time.monotonic())) or True)
+        loop.call(lambda: True)  # after the turn in which it changed
+        assert len(socket.frames) == sent
+    loop.call(lambda: model.close() or robot.destroy() or True)
+
+
+def test_many_changes_of_one_turn_are_one_frame(loop):
+    robots = [webmap.Robot(str(number)) for number in range(20)]
+
+    def build(page):
+        map = webmap.Map(page.element("map"))
+        for robot in robots:
+            map.add_robot(robot)
+
+    model = make_model(loop, build)
+    _, socket = open_page(model)
+
+    def move():
+        for robot in robots:
+            robot.svg.set_pose(1.0, 2.0, 3.0)
+        return True
+
+    loop.call(move)
+    loop.call(lambda: True)
+    assert len(socket.frames) == 2
     loop.call(lambda: model.close() or True)
-    assert 0.2 < slept[0] <= 0.25
+
+
+def test_frames_come_less_often_when_they_cost_more():
+    pace = FramePace()
+    assert pace.due(60.0) == -math.inf  # at once
+    pace.made(100.0, took=0.001, number=1)
+    assert pace.due(60.0) == pytest.approx(100.0 + 1 / 60)
+    assert pace.due(5.0) == pytest.approx(100.2)
+    pace.made(150.0, took=0.020, number=0)
+    assert pace.due(5.0) == pytest.approx(100.2)
+    pace.made(200.0, took=0.0198, number=1)
+    assert pace.due(60.0) == pytest.approx(200.05)
+    pace.made(300.0, took=0.0, number=100)
+    assert pace.due(60.0) == pytest.approx(300.05)
 
 
 def test_a_full_collection_does_not_look_at_the_objects_of_open_pages(loop):

@@ -25,7 +25,7 @@ class Hanging {
 const online = [];
 globalThis.addEventListener = (_, fn) => online.push(fn);
 globalThis.WebSocket = Hanging;
-const { Link } = await import("../../src/webmap/web/link.js");
+const { AnswerPace, Link } = await import("../../src/webmap/web/link.js");
 
 function makeLink(t, first) {
   Hanging.made = [];
@@ -134,4 +134,15 @@ test("a link replaces a first socket that has closed", (t) => {
   const { link } = makeLink(t, firstSocket(Hanging.CLOSED));
   assert.ok(link.opens);
   assert.equal(Hanging.made.length, 1);
+});
+
+test("a page answers at once while drawing is cheap, and draws half of the time else", () => {
+  const pace = new AnswerPace();
+  assert.equal(pace.pause, 0);
+  for (let frame = 0; frame < 30; frame += 1) pace.drawn(6);
+  assert.equal(pace.pause, 0);
+  for (let frame = 0; frame < 30; frame += 1) pace.drawn(25);
+  assert.ok(Math.abs(pace.pause - 25) < 0.1);
+  pace.drawn(60_000); // the page was not shown meanwhile
+  assert.ok(pace.pause < 45);
 });

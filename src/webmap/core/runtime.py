@@ -8,8 +8,10 @@ bytes from it.
 import asyncio
 import inspect
 import logging
+import math
 import sys
 import threading
+import time
 from collections.abc import Callable
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, Protocol
@@ -19,7 +21,6 @@ from webmap.base.audience import audience
 from webmap.base.geometry import Quaternion, Twist
 from webmap.base.lifecycle import lifecycle
 from webmap.base.scope import Removal
-from webmap.base.tasks import spawn
 from webmap.core.motion import RobotMotion, robot_motions
 from webmap.core.refusals import refusals
 from webmap.core.visible_robot import robots
@@ -32,6 +33,7 @@ from webmap.gate.protocol import (
     SentPose,
     SentTwist,
 )
+from webmap.scene.node import frame_request
 
 if TYPE_CHECKING:
     from webmap.agents.gates import Gates
@@ -46,15 +48,57 @@ While the model's thread is busy, the web thread waits this long several times f
 message to a page. With 1 ms, the ticks to operators came up to 0.3 s late.
 """
 
-FRAME_RATE = 20.0
-"""Frames a second for each viewer, at most."""
+FRAME_RATE = 60.0
+"""Frames a second for each viewer, at most: more than most displays show."""
+
+REST = 0.1
+"""Seconds between frames while nothing changes: ages, and signs of life."""
+
+SENDING = 0.0002
+"""Processor time of the web thread for sending a small frame, in seconds."""
+
+SHARE = 0.4
+"""The part of a core that frames may take; then they come less often."""
+
+
+class FramePace:
+    """Decides when frames are made: at once after a change, then at a rate.
+
+    All times are in seconds of one monotonic clock.
+    """
+
+    def __init__(self) -> None:
+        self._begun = -math.inf
+        self._cost = 0.0
+
+    def due(self, rate: float) -> float:
+        """Return the earliest time of the next frames.
+
+        Args:
+            rate: Frames a second, at most.
+
+        """
+        return self._begun + max(1.0 / rate, self._cost / SHARE)
+
+    def made(self, begun: float, took: float, number: int) -> None:
+        """Record frames that were made at the same time.
+
+        Args:
+            begun: When that began.
+            took: The time to make them.
+            number: The number of pages that got one; no frame delays no other.
+
+        """
+        if number:
+            self._begun = begun
+            self._cost = took + number * SENDING
 
 
 class Watcher(Protocol):
     """An observer of the model, usually a page."""
 
-    def tick(self, now: float) -> None:
-        """Take the changes, at the loop's monotonic time ``now``."""
+    def tick(self, now: float) -> bool:
+        """Take the changes, at the monotonic time ``now``; return whether some came."""
 
     def notice(self, text: str) -> None:
         """Show a sentence that every viewer should read."""
@@ -74,7 +118,8 @@ class Runtime:
         self._watchers: dict[int, Watcher] = {}
         self._serves_pages = False
         self._on_stop: list[Callable[[], None]] = []
-        self._has_watchers = asyncio.Event()
+        self._pace = FramePace()
+        self._next_frames: asyncio.Handle | None = None
         self._ending = asyncio.Event()
 
     @property
@@ -92,7 +137,7 @@ class Runtime:
         # A busy model's thread keeps the interpreter for this long at a time, while the
         # web thread must pass on the ticks to operators.
         sys.setswitchinterval(min(SWITCH, sys.getswitchinterval()))
-        self._has_watchers, self._ending = asyncio.Event(), asyncio.Event()
+        self._ending = asyncio.Event()
         ready = threading.Event()
         failure: list[BaseException] = []
         self._thread = threading.Thread(
@@ -164,14 +209,14 @@ class Runtime:
     def watch(self, watcher: Watcher) -> Removal:
         """Tick ``watcher`` until the removal; called in the model's thread."""
         self._watchers[id(watcher)] = watcher
-        self._has_watchers.set()
+        if self._next_frames is None:
+            frame_request.renew()
+            self._make_frames_in(REST)
         opened = audience.page_opened()
 
         def undo() -> None:
             opened.remove()
             self._watchers.pop(id(watcher), None)
-            if not self._watchers:
-                self._has_watchers.clear()
 
         return Removal(undo)
 
@@ -208,10 +253,12 @@ class Runtime:
             for motion in list(robot_motions):
                 motion.declare_or_complain()
             ready.set()
-            ticking = spawn(self._tick_on())
+            frame_request.listen(self._on_change)
             await self._ending.wait()
-            ticking.cancel()
         finally:
+            frame_request.listen(None)
+            if self._next_frames is not None:
+                self._next_frames.cancel()
             for fn in self._on_stop:
                 fn()
             audience.end()
@@ -221,19 +268,36 @@ class Runtime:
             await lifecycle.end()
             await asyncio.to_thread(close_peers)
 
-    async def _tick_on(self) -> None:
-        loop = asyncio.get_running_loop()
-        due = loop.time()
-        while True:
-            await self._has_watchers.wait()
-            now = loop.time()
-            due = max(due + 1.0 / self.frame_rate, now)
-            for watcher in list(self._watchers.values()):
-                try:
-                    watcher.tick(now)
-                except Exception:
-                    log.exception("a frame for %r failed", watcher)
-            await asyncio.sleep(max(0.0, due - loop.time()))
+    def _on_change(self) -> None:
+        """Make frames soon: the first change since the last ones."""
+        if threading.current_thread() is not self._thread:
+            self.call(self._on_change)
+        elif self._watchers:
+            self._make_frames_in(self._pace.due(self.frame_rate) - time.monotonic())
+
+    def _make_frames_in(self, seconds: float) -> None:
+        if self._next_frames is not None:
+            self._next_frames.cancel()
+        loop = self._started_loop()
+        if seconds <= 0.0:  # after what came with the change
+            self._next_frames = loop.call_soon(self._make_frames)
+        else:
+            self._next_frames = loop.call_later(seconds, self._make_frames)
+
+    def _make_frames(self) -> None:
+        frame_request.renew()
+        now, number = time.monotonic(), 0
+        for watcher in list(self._watchers.values()):
+            try:
+                number += watcher.tick(now)
+            except Exception:
+                log.exception("a frame for %r failed", watcher)
+        self._pace.made(now, time.monotonic() - now, number)
+        self._next_frames = None
+        if frame_request.is_made:  # something changed meanwhile
+            self._on_change()
+        elif self._watchers:
+            self._make_frames_in(max(REST, self._pace.due(self.frame_rate) - now))
 
     def _on_report(self, report: Report) -> None:
         if isinstance(report, RefusedCount):

@@ -31,9 +31,13 @@ GRACE = 3.0
 frame is reported missing: publishers are still being discovered, and static frames
 arrive late."""
 
-PERIOD = 0.05
+PERIOD = 1 / 60
 """The least time between two calls of the listeners in seconds: transforms that arrive
 meanwhile share one call, however many nodes share the topic."""
+
+SHARE, LONGEST = 0.1, 0.05
+"""The part of a core that calls of listeners may take before they come less often, and
+the longest time between two of them for that reason, in seconds."""
 
 KEPT_FOR = 10.0
 """Seconds for which a fault of frames that move is shown after it last occurred."""
@@ -145,7 +149,7 @@ class Frames:
         """When the first transform of the current call of the listeners arrived, in
         seconds of :func:`time.monotonic`."""
         self._pending_since: float | None = None
-        self._notified_at = -math.inf
+        self._next_call = -math.inf
         self._listeners: dict[int, Callable[[], object]] = {}
         self._needs: dict[int, Callable[[], bool]] = {}
         self._raised: set[tuple[int, type[Exception]]] = set()
@@ -175,7 +179,8 @@ class Frames:
     ) -> Removal:
         """Call ``listener`` when frames have moved, until the removal.
 
-        The call is immediate, or :data:`PERIOD` after the last call.
+        The call is immediate, or :data:`PERIOD` after the last call, or later if the
+        calls take long.
 
         Args:
             listener: The function.
@@ -254,24 +259,27 @@ class Frames:
         """Call all listeners; later if they were only just called."""
         loop = self._loop
         # Before the connection opens there is no loop, and no need to limit calls.
-        if loop is None or loop.time() >= self._notified_at + PERIOD:
+        if loop is None or loop.time() >= self._next_call:
             self._notify()
         elif self._soon is None:
-            self._soon = loop.call_at(self._notified_at + PERIOD, self._notify)
+            self._soon = loop.call_at(self._next_call, self._notify)
 
     def _notify(self) -> None:
         if self._soon is not None:
             self._soon.cancel()
             self._soon = None
         since, self._pending_since = self._pending_since, None
-        self.received_at = time.monotonic() if since is None else since
+        begun = time.monotonic()
+        self.received_at = begun if since is None else since
         for key, listener in list(self._listeners.items()):
             try:
                 listener()
             except Exception as error:  # The other listeners must run too.
                 self._log_raised(key, error)
         if self._loop is not None:  # A slow call leaves time for the rest.
-            self._notified_at = self._loop.time()
+            took = time.monotonic() - begun
+            pause = max(PERIOD, min(took / SHARE, LONGEST))
+            self._next_call = self._loop.time() + pause
 
     def _log_raised(self, key: int, error: Exception) -> None:
         """Log an exception of a listener once: it may occur at every call."""

@@ -2,13 +2,41 @@
 
 import itertools
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple, Self
 
 from webmap.base.errors import SceneError
 
 _node_ids = itertools.count(1)
 _fragment_ids = itertools.count(1)
+
+
+class FrameRequest:
+    """The request for a frame, made by the first change after each frame."""
+
+    def __init__(self) -> None:
+        self.is_made = True
+        """Whether a frame is requested; always, while nobody makes frames."""
+        self._listener: Callable[[], object] | None = None
+
+    def listen(self, listener: Callable[[], object] | None) -> None:
+        """Call ``listener`` for each request, until there is another one or None."""
+        self._listener = listener
+        self.is_made = listener is None
+
+    def make(self) -> None:
+        """Request a frame, unless one is requested already."""
+        if not self.is_made and self._listener is not None:
+            self.is_made = True
+            self._listener()
+
+    def renew(self) -> None:
+        """Set that a frame is about to be made: a change after it needs another."""
+        self.is_made = self._listener is None
+
+
+frame_request = FrameRequest()
+"""The request for a frame of this process."""
 
 
 class Node:
@@ -270,6 +298,8 @@ class Fragment:
         self.revision = revision = self.revision + 1
         if not waits:
             self.urgent = revision
+            if not frame_request.is_made:
+                frame_request.make()
         node._slots[slot] = node._changed = revision
         if slot == "dots":
             self.dotted[node.id] = node
@@ -280,12 +310,14 @@ class Fragment:
     def put_in(self, node: Node) -> None:
         """Record that ``node`` was added to the tree."""
         self.revision = self.urgent = self.revision + 1
+        frame_request.make()
         self._added[node.id] = node
         self._adopt(node)
 
     def take_out(self, node: Node) -> None:
         """Record that ``node`` is removed from the tree."""
         self.revision = self.urgent = self.revision + 1
+        frame_request.make()
         # A node that was never sent needs no removal.
         if node._attached <= self._sent:
             self._removed.append((self.revision, node.id))

@@ -82,8 +82,8 @@ def asgi_app(
         origins: Origins that may open sockets in addition to the server's own, such as
             ``"https://robots.example.org"`` if a proxy ends TLS.
         max_pages: The greatest number of open pages, at least 1.
-        frame_rate: Frames a second for each page, from 1 to 20. Fewer let one display
-            serve more pages; ticks and commands are as fast as ever.
+        frame_rate: Frames a second for each page at most, from 1 to 60. Fewer let one
+            display serve more pages; ticks and commands are as fast as ever.
 
     Raises:
         ConfigError: If the token is too short, or a host, an origin or a number is not
@@ -128,8 +128,8 @@ def run(
         insecure_lan: Whether other machines may be served without TLS, so that
             everybody on the network in between can read the token.
         max_pages: The greatest number of open pages, at least 1.
-        frame_rate: Frames a second for each page, from 1 to 20. Fewer let one display
-            serve more pages; ticks and commands are as fast as ever.
+        frame_rate: Frames a second for each page at most, from 1 to 60. Fewer let one
+            display serve more pages; ticks and commands are as fast as ever.
 
     Raises:
         ConfigError: If it cannot listen there, or a number is not valid.

@@ -168,12 +168,13 @@ class PageHost:
         self.lost_at = time.monotonic()
         self._giving_up = asyncio.get_running_loop().call_later(KEPT_FOR, self.close)
 
-    def tick(self, now: float) -> None:
-        """Send the changes, if the page keeps up."""
-        if self._socket is not None:
-            data = self._session.frame(time.monotonic())
-            if data is not None:
-                self._socket.offer(data)
+    def tick(self, now: float) -> bool:
+        """Send the changes, if the page keeps up; return whether there were some."""
+        data = None if self._socket is None else self._session.frame(now)
+        if self._socket is None or data is None:
+            return False
+        self._socket.offer(data)
+        return True
 
     def notice(self, text: str) -> None:
         """Show a sentence to the viewer until it is dismissed."""

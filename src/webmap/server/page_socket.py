@@ -68,7 +68,8 @@ class SocketLimits:
     """Messages at once. A connection that stalled delivers its queue at once."""
 
 
-SCENE = SocketLimits(max_bytes=16 * 1024, rate=120.0, burst=240.0)
+# An answer to each of 60 frames, and three kinds of events as often.
+SCENE = SocketLimits(max_bytes=16 * 1024, rate=240.0, burst=480.0)
 # 20 commands a second for the 6 s after which a silent connection is given up.
 DRIVE = SocketLimits(max_bytes=1024, rate=60.0, burst=120.0)
 

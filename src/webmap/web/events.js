@@ -124,8 +124,11 @@ function describeInput(target) {
   return {};
 }
 
-/** Of these, only the newest is sent, once for each drawing of the page. */
+/** Of these, only the newest is sent, with a drawing of the page. */
 const FREQUENT = new Set(["mousemove", "pointermove", "wheel", "input"]);
+
+/** Milliseconds between two of these; a display with 240 Hz draws more often. */
+const PERIOD = 15;
 
 /** Sends events to the server. */
 export class Reports {
@@ -138,6 +141,7 @@ export class Reports {
     this._mapOf = mapOf;
     /** @type {Map<string, Record<string, any>>} */
     this._waiting = new Map();
+    this._flushed = -PERIOD;
   }
 
   /**
@@ -174,10 +178,18 @@ export class Reports {
    * @param {Record<string, any>} message
    */
   _keep(key, message) {
-    if (this._waiting.size === 0) requestAnimationFrame(() => this._flush());
+    if (this._waiting.size === 0) this._flushSoon();
     const before = this._waiting.get(key);
     if (before?.delta !== undefined) message.delta += before.delta;
     this._waiting.set(key, message);
+  }
+
+  _flushSoon() {
+    requestAnimationFrame((now) => {
+      if (now - this._flushed < PERIOD) return this._flushSoon();
+      this._flushed = now;
+      this._flush();
+    });
   }
 
   _flush() {

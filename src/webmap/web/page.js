@@ -10,7 +10,7 @@ import { BASE, whyRefused } from "./access.js";
 import { LONGEST_TEXTS } from "./constants.js";
 import { Reports } from "./events.js";
 import { BrowserParts, importOf } from "./browser_parts.js";
-import { Link } from "./link.js";
+import { AnswerPace, Link } from "./link.js";
 import { Notices, showBareStop } from "./notices.js";
 import { dark, id, path, sceneAddress, takeFirstSocket } from "./opening.js";
 import { Scene } from "./scene.js";
@@ -61,6 +61,7 @@ export class Page {
     /** @type {Array<{data: ArrayBuffer, received: number}>} */
     this._frames = [];
     this._drawing = 0;
+    this._pace = new AnswerPace();
     this._restyling = 0;
     /** Whether nothing came yet over this connection. */
     this._isNew = false;
@@ -222,9 +223,21 @@ export class Page {
 
   _draw() {
     this._drawing = 0;
+    const begun = performance.now();
+    let newest = 0;
     for (const { data, received } of this._frames.splice(0)) {
-      if (!this._apply(data, received)) return;
+      newest = this._apply(data, received);
+      if (newest === 0) break;
     }
+    if (newest === 0) return;
+    const answer = () => this.send({ op: "seen", frame: newest });
+    const { pause } = this._pace;
+    if (pause === 0) answer();
+    // A timer runs after style, layout and painting of this frame.
+    setTimeout(() => {
+      this._pace.drawn(performance.now() - begun);
+      if (pause > 0) setTimeout(answer, pause);
+    });
   }
 
   /** Sheets that load together are read once, because each reading computes styles. */
@@ -236,16 +249,16 @@ export class Page {
   /**
    * @param {ArrayBuffer} data
    * @param {number} received
-   * @returns {boolean} Whether the frame was valid.
+   * @returns {number} The number of the frame; 0 if it was not valid.
    */
   _apply(data, received) {
     try {
-      this.send({ op: "seen", frame: this.scene.apply(data, received) });
+      const number = this.scene.apply(data, received);
       this._failures = 0;
-      return true;
+      return number;
     } catch (error) {
       this._misunderstood(error);
-      return false;
+      return 0;
     }
   }
 

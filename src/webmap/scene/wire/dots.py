@@ -14,7 +14,7 @@ from typing import NamedTuple, cast
 from webmap.base.geometry import Affine, Pose
 from webmap.scene.element import Element
 from webmap.scene.live import Dots, Rays
-from webmap.scene.node import Fragment, Node
+from webmap.scene.node import Fragment, Node, frame_request
 from webmap.scene.wire.messages import ViewReport
 from webmap.scene.wire.opcodes import Op, varint
 from webmap.scene.wire.page_state import MapView, Mount
@@ -111,6 +111,7 @@ class PageDots:
         self.due = self._finer = False
 
     def _look_again(self) -> None:
+        frame_request.make()
         self.due = True
         self._views.clear()
 

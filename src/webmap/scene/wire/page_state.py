@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import ClassVar
 
 from webmap.scene.element import Element
-from webmap.scene.node import Fragment
+from webmap.scene.node import Fragment, frame_request
 from webmap.scene.wire.encode import EVENT_NUMBER, encode_snapshot
 from webmap.scene.wire.messages import ViewReport
 from webmap.scene.wire.opcodes import PREVENT, STOP, VIEW_OPERATIONS, Op, string, varint
@@ -176,6 +176,7 @@ class PendingRecords:
 
     def unmounted(self, number: int) -> None:
         """Add the end of a mount that the page has."""
+        frame_request.make()
         self.gone += bytes((Op.UNMOUNT, *varint(number)))
         if len(self.gone) > self.BYTES_KEPT:
             self.gone.clear()
@@ -183,6 +184,7 @@ class PendingRecords:
 
     def record(self, record: bytes | bytearray) -> None:
         """Add a record that can be made again."""
+        frame_request.make()
         self.records += record
         if len(self.records) > self.BYTES_KEPT:
             # All of it can be made again from the stored state, which is shorter.
@@ -191,6 +193,7 @@ class PendingRecords:
 
     def message(self, record: bytes) -> None:
         """Add a message, which is sent once; of too many, the newest are kept."""
+        frame_request.make()
         self.messages.append(record)
         self._message_bytes += len(record)
         # A page that is inactive for this long needs the newest.
@@ -210,6 +213,7 @@ class PendingRecords:
 
     def problem(self, number: int, text: str) -> None:
         """Add a problem, or end it if the text is empty; the newest text counts."""
+        frame_request.make()
         record = bytes((Op.PROBLEM, *varint(number))) + string(text)
         self.current_problems.pop(number, None)
         if text:

@@ -13,7 +13,7 @@ from webmap.base.errors import WireError
 from webmap.scene.allowed import check_event
 from webmap.scene.element import Element, split_classes
 from webmap.scene.live import AGES_EVERY
-from webmap.scene.node import Fragment
+from webmap.scene.node import Fragment, frame_request
 from webmap.scene.wire.dots import PageDots
 from webmap.scene.wire.encode import delta, encode_changes
 from webmap.scene.wire.messages import (
@@ -43,9 +43,10 @@ _GZIP = 16 + zlib.MAX_WBITS
 class SceneSession:
     """The state of one page: what was sent to it, and what to send next.
 
-    Call :meth:`frame` at each tick and send every result in order: a frame builds on
-    those before it. While the page has not acknowledged :data:`WINDOW` frames, there is
-    no next one; changes in the meantime are later sent with their newest values.
+    Call :meth:`frame` after changes and ten times a second, and send every result in
+    order: a frame builds on those before it. While the page has not acknowledged
+    :data:`WINDOW` frames, there is no next one; changes in the meantime are later sent
+    with their newest values.
     """
 
     WINDOW = 2
@@ -74,6 +75,7 @@ class SceneSession:
         self._numbers = itertools.count(1)
         self._frame = 0
         self._seen = 0
+        self._waits = False  # whether changes may wait for an answer of the page
         self._spoke = math.inf
         self._late = -math.inf  # when an answer of the page was late
         self._aged = -math.inf  # the number of the last period whose ages were sent
@@ -113,6 +115,7 @@ class SceneSession:
         self._mounts[number] = Mount(number, fragment, within or 0, under, order)
         self._fragments.setdefault(fragment, None)
         self._pending.new.append(number)
+        frame_request.make()
         self._dots.mounts_changed()
         return number
 
@@ -312,6 +315,8 @@ class SceneSession:
             case Seen(frame=frame):
                 if self._seen < frame <= self._frame:
                     self._seen = frame
+                    if self._waits:
+                        frame_request.make()
                 return []
             case Unseen(elements=elements):
                 self._dots.switch_off(elements)
@@ -351,7 +356,8 @@ class SceneSession:
         """
         if self._seen < self._frame and now - self._spoke >= self.LATE:
             self._late = now
-        if self._frame - self._seen >= self.WINDOW:
+        self._waits = self._frame - self._seen >= self.WINDOW
+        if self._waits:
             return None
         self._dots.wait(now)
         period = now // AGES_EVERY
