@@ -21,7 +21,7 @@ from webmap.ros import messages
 class Listening(Removal):
     """A subscription whose rate makes no difference."""
 
-    def set_unwatched(self, unwatched):
+    def set_pace(self, throttle, unwatched):
         pass
 
 

@@ -24,7 +24,7 @@ from webmap.scene.live import Rays
 class Listening(Removal):
     """A subscription whose rate makes no difference."""
 
-    def set_unwatched(self, unwatched):
+    def set_pace(self, throttle, unwatched):
         pass
 
 

@@ -68,7 +68,7 @@ class Jumping(selectors.SelectSelector):
 class Listening(Removal):
     """A subscription whose rate makes no difference."""
 
-    def set_unwatched(self, unwatched: int) -> None:
+    def set_pace(self, throttle: int, unwatched: int) -> None:
         pass
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from equipment.fake_rosbridge import bridged, until
 from webmap import Robot
+from webmap.core.frame_pace import FramePace
 from webmap.poses.frames import PERIOD
 from webmap.ros.tf import Transform
 from webmap.ros.tf.buffer import HISTORY
@@ -60,6 +61,44 @@ def counted(robot: Robot, monkeypatch) -> list[float]:
     return drawn
 
 
+@pytest.mark.parametrize("needed", [False, True], ids=["looked at", "needed"])
+def test_of_the_poses_between_two_frames_only_the_newest_is_drawn_unless_all_are_needed(
+    monkeypatch, needed
+):
+    pace = FramePace()
+    monkeypatch.setattr("webmap.core.pose_source.frame_pace", pace)
+    pace.made(time.monotonic(), took=10.0, number=1)
+    pace.due(60.0)
+
+    async def scenario() -> None:
+        async with bridged() as (server, bridge):
+            robot = Robot("fast")
+            monkeypatch.setattr(robot, "_needs_poses", lambda: needed)
+            drawn = counted(robot, monkeypatch)
+            robot.set_odometry_topic(bridge, "/odom", 0, type="nav_msgs/Odometry")
+            await server.wait_for("subscribe", topic="/odom")
+            seen = []
+            monkeypatch.setattr(
+                robot.pose_source,
+                "_on_reading",
+                lambda reading, take=robot.pose_source._on_reading: (
+                    take(reading),
+                    seen.append(reading),
+                ),
+            )
+            robot.feed._listener = robot.pose_source._on_reading
+            for number in range(5):
+                await server.publish("/odom", odometry(number))
+            await until(lambda: len(seen) == 5)
+            assert len(drawn) == (5 if needed else 1)
+            pace.prepare()
+            assert drawn[-1] == 4 / 1000
+            assert len(drawn) == (5 if needed else 2)
+            robot.destroy()
+
+    asyncio.run(scenario())
+
+
 @pytest.mark.slow
 def test_odometry_at_1_khz_is_requested_and_drawn_ten_times_a_second(monkeypatch):
     async def scenario() -> None:
@@ -80,7 +119,7 @@ def test_odometry_at_1_khz_is_requested_and_drawn_ten_times_a_second(monkeypatch
 
 
 @pytest.mark.slow
-def test_frames_at_1_khz_move_the_robot_twenty_times_a_second(monkeypatch):
+def test_frames_at_1_khz_move_the_robot_sixty_times_a_second(monkeypatch):
     async def scenario() -> None:
         async with bridged() as (server, bridge):
             robot = Robot("fast")

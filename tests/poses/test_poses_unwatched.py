@@ -48,17 +48,17 @@ def test_few_poses_come_while_nobody_looks(bridge, robot):
     audience._set(False)
     assert throttle(bridge) == RARELY
     audience._set(True)
-    assert throttle(bridge) == 100
+    assert throttle(bridge) == 16
 
 
 def test_all_poses_come_while_a_program_has_control_or_sent_a_goal(bridge, robot):
     audience._set(False)
     held(robot, holder=SimpleNamespace(connection="p1", name="patrol"))
-    assert throttle(bridge) == 100
+    assert throttle(bridge) == 16
     held(robot)
     assert throttle(bridge) == RARELY
     held(robot, goal=SimpleNamespace(state="active"))
-    assert throttle(bridge) == 100
+    assert throttle(bridge) == 16
     held(robot, goal=SimpleNamespace(state="reached"))
     assert throttle(bridge) == RARELY
 
@@ -77,7 +77,7 @@ def test_all_poses_come_to_a_module_of_the_user_but_not_for_the_trail(bridge, ro
     assert throttle(bridge) == RARELY
     odometer = robot.add_module(Odometer)
     held(robot)
-    assert throttle(bridge) == 100
+    assert throttle(bridge) == 16
     robot.remove_module(odometer)
     held(robot)
     assert throttle(bridge) == RARELY
@@ -357,3 +357,24 @@ def test_who_begins_to_look_gets_the_state_of_now(monkeypatch):
         assert robot.svg.get("data-state") == "watched"
 
     play(script, monkeypatch)
+
+
+def test_the_more_robots_a_bridge_has_the_fewer_poses_of_each_are_requested():
+    bridge = Bridge("ws://robot:9090")
+    robots = [Robot(str(number)) for number in range(21)]
+    fixed = Robot("fixed")
+    fixed.set_odometry_topic(bridge, "/fixed", 200, type="nav_msgs/Odometry")
+    requested = []
+    for robot in robots:
+        robot.set_odometry_topic(bridge, f"/r{robot.name}", type="nav_msgs/Odometry")
+        requested.append({each.feed.period for each in robots if each.feed})
+    assert requested == [{0.016}] * 6 + [{0.033}] * 7 + [{0.05}] * 7 + [{0.1}]
+    robots[0].unsubscribe_odometry_topic()
+    assert {each.feed.period for each in robots if each.feed} == {0.05}
+    assert fixed.feed.period == 0.2
+    far = Robot("far")
+    agent = Bridge("zenoh://router.example/agent")
+    far.set_odometry_topic(agent, "/odom", type="nav_msgs/Odometry")
+    assert far.feed.period == 0.1
+    for robot in (*robots, fixed, far):
+        robot.destroy()

@@ -96,7 +96,7 @@ def test_a_listener_may_begin_to_need_all_messages():
             listener = bridge.subscribe("/a", print, TYPE, throttle=100, unwatched=5000)
             audience._set(False)
             await until(lambda: asked(server, "/a") == [5000])
-            listener.set_unwatched(0)
+            listener.set_pace(100, 0)
             await until(lambda: asked(server, "/a") == [100])
 
     asyncio.run(scenario())

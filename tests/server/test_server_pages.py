@@ -13,8 +13,8 @@ import webmap
 from webmap.base.errors import MotionError
 from webmap.base.scope import Removal, keep
 from webmap.core.base_page import Viewer
+from webmap.core.frame_pace import FramePace
 from webmap.core.layer import Layer
-from webmap.core.runtime import FramePace
 from webmap.features.layers.laser_scanner import LaserScanner, SweepMsg
 from webmap.ros.rosbridge.events import Publish
 from webmap.server import open_pages as host_module
@@ -82,7 +82,8 @@ def test_many_changes_of_one_turn_are_one_frame(loop):
         return True
 
     loop.call(move)
-    loop.call(lambda: True)
+    wait_for(lambda: len(socket.frames) > 1)
+    time.sleep(0.05)
     assert len(socket.frames) == 2
     loop.call(lambda: model.close() or True)
 

@@ -317,7 +317,7 @@ def test_a_stop_in_a_flood_of_messages_reaches_the_gate(rooms, open_socket):
     assert connection.received.count(stop) in range(1, 62)
 
 
-@pytest.mark.parametrize(("name", "rate"), [("scene?id=p", 120), ("drive?id=p", 60)])
+@pytest.mark.parametrize(("name", "rate"), [("scene?id=p", 240), ("drive?id=p", 60)])
 def test_a_socket_with_too_many_messages_per_second_is_closed(
     rooms, open_socket, name, rate
 ):

@@ -40,8 +40,9 @@ class OdometryConfig(TopicConfig, kw_only=True, frozen=True):
     topic: Annotated[str, checks.topic]
     type: Annotated[str, checks.message_type(*ODOMETRY_TYPES)] | None = None
     """If not given, the bridge is queried."""
-    throttle: Annotated[int, checks.milliseconds] = 100
-    """The least time between two messages, in milliseconds."""
+    throttle: Annotated[int, checks.milliseconds] | None = None
+    """The least time between two messages, in milliseconds; if not given, 16 for up to
+    6 robots of a bridge, 33 up to 13, 50 up to 20, and 100 for more."""
     bridge: str = ""
 
 

@@ -4,6 +4,7 @@
 clock and the alignment.
 """
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -11,6 +12,7 @@ from typing import Any
 
 from webmap.base.geometry import Affine, Pose
 from webmap.base.scope import Removal, no_scope
+from webmap.core.frame_pace import frame_pace
 from webmap.core.movable_robot import MovableRobot
 from webmap.poses.alignment import HERE, alignments
 from webmap.poses.frames import Frames, frames_of
@@ -56,6 +58,9 @@ class PoseSource:
         self.period = 0.0
         """The least time from that pose to the next one, in seconds."""
         self._is_needed = False
+        self._waiting: tuple[PoseReading, float] | None = None
+        """A pose of the topic that was not processed yet, and when it arrived."""
+        self._processed_at = -math.inf
         self._robot = robot
         self._show_pose = show_pose
         self._silence = SilenceWatch(lambda: robot.name)
@@ -67,7 +72,7 @@ class PoseSource:
     # Sources of poses.
 
     def follow(
-        self, bridge: Bridge, topic: str, throttle: int, type: str | None
+        self, bridge: Bridge, topic: str, throttle: int | None, type: str | None
     ) -> None:
         """Receive poses from a topic; see :meth:`Robot.set_odometry_topic`."""
         self.unfollow()
@@ -234,7 +239,7 @@ class PoseSource:
             self._robot.set_problem("odometry", text)
 
     def _on_reading(self, reading: PoseReading) -> None:
-        """Process a pose from the topic."""
+        """Process a pose from the topic, or keep the newest until the next frames."""
         feed = self.feed
         if feed is None:
             return
@@ -242,7 +247,20 @@ class PoseSource:
         if feed.type == ODOMETRY:  # other poses may arrive only while the robot moves
             self.expected_at, self.period = now, feed.period
             self._silence.record(now, self.period)
-        self._show(self.pipeline.step(reading, self.frames, now), now - feed.bridge.lag)
+        self._waiting = (reading, now)
+        if self._is_needed:
+            self._process()
+        else:
+            frame_pace.process(self._processed_at, now, self._process)
+
+    def _process(self) -> None:
+        """Process the newest pose of the topic, if one waits."""
+        waiting, self._waiting = self._waiting, None
+        if waiting is None or self.feed is None:
+            return
+        reading, self._processed_at = waiting
+        step = self.pipeline.step(reading, self.frames, self._processed_at)
+        self._show(step, self._processed_at - self.feed.bridge.lag)
 
     def _on_frames(self) -> None:
         """Process the pose of the base from TF, if there is no topic."""
@@ -298,10 +316,11 @@ class PoseSource:
 
     def _restart(self) -> None:
         """Discard the poses so far; the next ones are from another source."""
+        self._waiting = None
         feed, frames = self.feed, self.frames
         bridge, topic, period = None, "", None
         if feed is not None:
-            bridge, topic, period = feed.bridge, feed.topic, feed.throttle / 1000
+            bridge, topic, period = feed.bridge, feed.topic, feed.period
         elif frames is not None:
             bridge, topic = frames.bridge, f"{frames.namespace}/tf"
         self.pipeline.restart(period)

@@ -8,7 +8,6 @@ bytes from it.
 import asyncio
 import inspect
 import logging
-import math
 import sys
 import threading
 import time
@@ -21,6 +20,7 @@ from webmap.base.audience import audience
 from webmap.base.geometry import Quaternion, Twist
 from webmap.base.lifecycle import lifecycle
 from webmap.base.scope import Removal
+from webmap.core.frame_pace import frame_pace
 from webmap.core.motion import RobotMotion, robot_motions
 from webmap.core.refusals import refusals
 from webmap.core.visible_robot import robots
@@ -54,45 +54,6 @@ FRAME_RATE = 60.0
 REST = 0.1
 """Seconds between frames while nothing changes: ages, and signs of life."""
 
-SENDING = 0.0002
-"""Processor time of the web thread for sending a small frame, in seconds."""
-
-SHARE = 0.4
-"""The part of a core that frames may take; then they come less often."""
-
-
-class FramePace:
-    """Decides when frames are made: at once after a change, then at a rate.
-
-    All times are in seconds of one monotonic clock.
-    """
-
-    def __init__(self) -> None:
-        self._begun = -math.inf
-        self._cost = 0.0
-
-    def due(self, rate: float) -> float:
-        """Return the earliest time of the next frames.
-
-        Args:
-            rate: Frames a second, at most.
-
-        """
-        return self._begun + max(1.0 / rate, self._cost / SHARE)
-
-    def made(self, begun: float, took: float, number: int) -> None:
-        """Record frames that were made at the same time.
-
-        Args:
-            begun: When that began.
-            took: The time to make them.
-            number: The number of pages that got one; no frame delays no other.
-
-        """
-        if number:
-            self._begun = begun
-            self._cost = took + number * SENDING
-
 
 class Watcher(Protocol):
     """An observer of the model, usually a page."""
@@ -118,7 +79,6 @@ class Runtime:
         self._watchers: dict[int, Watcher] = {}
         self._serves_pages = False
         self._on_stop: list[Callable[[], None]] = []
-        self._pace = FramePace()
         self._next_frames: asyncio.Handle | None = None
         self._ending = asyncio.Event()
 
@@ -217,6 +177,8 @@ class Runtime:
         def undo() -> None:
             opened.remove()
             self._watchers.pop(id(watcher), None)
+            if not self._watchers:
+                frame_pace.end()
 
         return Removal(undo)
 
@@ -273,7 +235,7 @@ class Runtime:
         if threading.current_thread() is not self._thread:
             self.call(self._on_change)
         elif self._watchers:
-            self._make_frames_in(self._pace.due(self.frame_rate) - time.monotonic())
+            self._make_frames_in(frame_pace.due(self.frame_rate) - time.monotonic())
 
     def _make_frames_in(self, seconds: float) -> None:
         if self._next_frames is not None:
@@ -285,19 +247,20 @@ class Runtime:
             self._next_frames = loop.call_later(seconds, self._make_frames)
 
     def _make_frames(self) -> None:
-        frame_request.renew()
         now, number = time.monotonic(), 0
+        frame_pace.prepare()
+        frame_request.renew()
         for watcher in list(self._watchers.values()):
             try:
                 number += watcher.tick(now)
             except Exception:
                 log.exception("a frame for %r failed", watcher)
-        self._pace.made(now, time.monotonic() - now, number)
+        frame_pace.made(now, time.monotonic() - now, number)
         self._next_frames = None
         if frame_request.is_made:  # something changed meanwhile
             self._on_change()
         elif self._watchers:
-            self._make_frames_in(max(REST, self._pace.due(self.frame_rate) - now))
+            self._make_frames_in(max(REST, frame_pace.due(self.frame_rate) - now))
 
     def _on_report(self, report: Report) -> None:
         if isinstance(report, RefusedCount):

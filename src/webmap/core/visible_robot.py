@@ -183,7 +183,7 @@ class VisibleRobot(MovableRobot):
         self,
         bridge: Bridge,
         topic: str,
-        throttle: int = 100,
+        throttle: int | None = None,
         *,
         type: str | None = None,
     ) -> None:
@@ -197,7 +197,9 @@ class VisibleRobot(MovableRobot):
         Args:
             bridge: The connection to the ROS system that has the topic.
             topic: The topic.
-            throttle: The least time between two messages, in milliseconds.
+            throttle: The least time between two messages, in milliseconds; if not
+                given, 16 for up to 6 robots of a bridge, 33 up to 13, 50 up to 20, and
+                100 for more.
             type: The message type.
 
         Raises:

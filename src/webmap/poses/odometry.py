@@ -4,6 +4,7 @@ import asyncio
 import time
 from collections.abc import Callable
 from typing import Any
+from weakref import WeakKeyDictionary
 
 from webmap.base.audience import RARELY
 from webmap.base.errors import ConfigError, ProtocolError
@@ -19,12 +20,56 @@ from webmap.poses.placing import (
 )
 from webmap.ros.bridge import Bridge
 from webmap.ros.decoding import convert
+from webmap.ros.names import is_agent_url
 from webmap.ros.subscriptions import Subscription, SubscriptionOptions
 
 ODOMETRY = "nav_msgs/Odometry"
 """The pose type that also has a velocity."""
 
 _NAMES = {view: name for name, view in ODOMETRY_VIEWS.items()}
+
+THROTTLES = ((6, 16), (13, 33), (20, 50))
+"""The throttle, in milliseconds, of up to so many robots of a bridge that name none: 60
+poses a second of a few robots, and 400 of all together."""
+
+MANY = 100
+"""The throttle of more robots, and of those behind an agent, in milliseconds."""
+
+
+class SharedThrottle:
+    """The throttle of the robots of one bridge that name none.
+
+    Args:
+        url: The address of the bridge.
+
+    """
+
+    def __init__(self, url: str) -> None:
+        self.value = MANY if is_agent_url(url) else THROTTLES[0][1]
+        """The least time between two messages of a robot, in milliseconds."""
+        self._is_fixed = is_agent_url(url)
+        self._feeds: dict[OdometryFeed, None] = {}
+
+    def join(self, feed: "OdometryFeed") -> None:
+        """Count a feed, and change the others if there are many now."""
+        self._feeds[feed] = None
+        self._update()
+
+    def leave(self, feed: "OdometryFeed") -> None:
+        """Count a feed no more."""
+        self._feeds.pop(feed, None)
+        self._update()
+
+    def _update(self) -> None:
+        count = len(self._feeds)
+        value = next((value for most, value in THROTTLES if count <= most), MANY)
+        if value != self.value and not self._is_fixed:
+            self.value = value
+            for feed in list(self._feeds):
+                feed.change_pace()
+
+
+_shared_throttles: WeakKeyDictionary[Bridge, SharedThrottle] = WeakKeyDictionary()
 
 
 class OdometryFeed:
@@ -33,7 +78,8 @@ class OdometryFeed:
     Args:
         bridge: The connection to the ROS system that has the topic.
         topic: The topic.
-        throttle: The least time between two messages, in milliseconds.
+        throttle: The least time between two messages, in milliseconds; None for that of
+            all robots of the bridge, see :data:`THROTTLES`.
         type: The message type; if not given, the bridge is queried, and the fields of
             the first message are examined.
         listener: Called with each pose, in the model's thread.
@@ -52,7 +98,7 @@ class OdometryFeed:
         self,
         bridge: Bridge,
         topic: str,
-        throttle: int,
+        throttle: int | None,
         type: str | None,
         *,
         listener: Callable[[PoseReading], None],
@@ -64,7 +110,12 @@ class OdometryFeed:
         self.topic = topic
         self.throttle = throttle
         self.type: str | None = None
-        self._asked = SubscriptionOptions(throttle=throttle, unwatched=RARELY)
+        self._unwatched = RARELY
+        self._shared: SharedThrottle | None = None
+        if throttle is None:
+            if bridge not in _shared_throttles:
+                _shared_throttles[bridge] = SharedThrottle(bridge.url)
+            self._shared = _shared_throttles[bridge]
         self._listener = listener
         self._typed = typed
         self._on_complaint = complain
@@ -75,12 +126,19 @@ class OdometryFeed:
         )
         self._subscription: Subscription | None = None
         self._type_query: Removable | None = None
+        if self._shared is not None:
+            self._shared.join(self)
         if type is None:
             self._type_query = TypeQuery(
                 bridge, topic, self._on_type, self._listen_untyped
             )
         else:
             self._subscribe(odometry_view(type))
+
+    @property
+    def _asked(self) -> SubscriptionOptions:
+        throttle = self.throttle if self._shared is None else self._shared.value
+        return SubscriptionOptions(throttle=throttle or 0, unwatched=self._unwatched)
 
     @property
     def period(self) -> float:
@@ -90,11 +148,15 @@ class OdometryFeed:
     def keep_on(self, needed: bool) -> None:
         """Receive all poses, or only some while nobody looks."""
         unwatched = 0 if needed else RARELY
-        if unwatched == self._asked.unwatched:
-            return
-        self._asked = self._asked._replace(unwatched=unwatched)
+        if unwatched != self._unwatched:
+            self._unwatched = unwatched
+            self.change_pace()
+
+    def change_pace(self) -> None:
+        """Ask the bridge for messages as often as now needed."""
         if self._subscription is not None:
-            self._subscription.set_unwatched(unwatched)
+            throttle, unwatched = self._asked.throttle, self._asked.unwatched
+            self._subscription.set_pace(throttle, unwatched)
 
     def remove(self) -> None:
         """Unsubscribe; a second call does nothing."""
@@ -102,6 +164,8 @@ class OdometryFeed:
             if thing is not None:
                 thing.remove()
         self._subscription = self._type_query = None
+        if self._shared is not None:
+            self._shared.leave(self)
 
     def _listen_untyped(self) -> None:
         """Determine the type from the first message: the bridge may not know the type.
@@ -114,8 +178,8 @@ class OdometryFeed:
                 self._subscription = self.bridge.subscribe(
                     self.topic,
                     self._on_first,
-                    throttle=self.throttle,
-                    unwatched=self._asked.unwatched,
+                    throttle=self._asked.throttle,
+                    unwatched=self._unwatched,
                 )
 
     def _on_type(self, type: str) -> None:
@@ -161,9 +225,9 @@ class OdometryFeed:
                 self.topic,
                 self._on_message,
                 self.type,
-                throttle=self.throttle,
+                throttle=self._asked.throttle,
                 decode=view,
-                unwatched=self._asked.unwatched,
+                unwatched=self._unwatched,
             )
 
     def _on_message(self, message: OdometryView) -> None:

@@ -213,9 +213,9 @@ class Subscription:
             self._scope.discard(self)
         self._of.remove(self)
 
-    def set_unwatched(self, unwatched: int) -> None:
-        """Change how often messages come while nobody looks; see ``subscribe``."""
-        self.options = self.options._replace(unwatched=unwatched)
+    def set_pace(self, throttle: int, unwatched: int) -> None:
+        """Change how often messages come; see ``subscribe``."""
+        self.options = self.options._replace(throttle=throttle, unwatched=unwatched)
         self._of.change_pace()
 
     def change_pace(self) -> bool:

@@ -256,6 +256,8 @@ class Fragment:
         self.id = next(_fragment_ids)
         self.root = root
         self.revision = 0
+        self.restructured = 0
+        """The revision at which a node was last added or removed."""
         self.urgent = 0
         """The revision of the newest change that pages get at once; newer ones wait."""
         self.memo: Any = None
@@ -309,14 +311,14 @@ class Fragment:
 
     def put_in(self, node: Node) -> None:
         """Record that ``node`` was added to the tree."""
-        self.revision = self.urgent = self.revision + 1
+        self.revision = self.restructured = self.urgent = self.revision + 1
         frame_request.make()
         self._added[node.id] = node
         self._adopt(node)
 
     def take_out(self, node: Node) -> None:
         """Record that ``node`` is removed from the tree."""
-        self.revision = self.urgent = self.revision + 1
+        self.revision = self.restructured = self.urgent = self.revision + 1
         frame_request.make()
         # A node that was never sent needs no removal.
         if node._attached <= self._sent:
@@ -369,14 +371,26 @@ class Fragment:
             changes.append(Removed(node_id))
         changes.reverse()
         changes.extend(self._added_since(revision))
+        changes.extend(
+            Changed(node, slot)
+            for node, slot in self.values_since(revision)
+            if node._attached <= revision
+        )
+        return changes
+
+    def values_since(self, revision: int) -> Iterator[tuple[Node, str]]:
+        """Yield each node and the name of each of its values that changed since then.
+
+        Args:
+            revision: The revision that was last sent.
+
+        """
         for node in reversed(self._touched.values()):
             if node._changed <= revision:
                 break
-            if node._attached <= revision:
-                for slot, when in node._slots.items():
-                    if when > revision:
-                        changes.append(Changed(node, slot))
-        return changes
+            for slot, when in node._slots.items():
+                if when > revision:
+                    yield node, slot
 
     def _added_since(self, revision: int) -> list[Added]:
         new: dict[Parent, set[Node]] = {}

@@ -17,7 +17,7 @@ from webmap.poses.frames import frames_of
 class Listening(Removal):
     """A subscription whose rate makes no difference."""
 
-    def set_unwatched(self, unwatched):
+    def set_pace(self, throttle, unwatched):
         pass
 
 

@@ -11,8 +11,8 @@ log = logging.getLogger("webmap.modules.several_robots")
 
 MOST = 50
 """The greatest number of robots that are selected at once: the page sends a STOP for
-each of them, and a page that sends more than 120 messages at once loses its
-connection."""
+each of them, and a page that sends more than 120 messages at once to the gate loses
+that connection."""
 
 
 class SeveralRobots:

@@ -62,16 +62,21 @@ class Track:
         if self.static:
             self._stamps[:], self._transforms[:] = [stamp], [transform]
             return
-        place = bisect_left(self._stamps, stamp)
-        if place < len(self._stamps) and self._stamps[place] == stamp:
-            self._transforms[place] = transform
+        stamps, transforms = self._stamps, self._transforms
+        if not stamps or stamp > stamps[-1]:  # nearly always
+            stamps.append(stamp)
+            transforms.append(transform)
         else:
-            self._stamps.insert(place, stamp)
-            self._transforms.insert(place, transform)
-        old = bisect_left(self._stamps, self._stamps[-1] - history)
-        old = max(old, len(self._stamps) - MOST)
-        if old:
-            del self._stamps[:old], self._transforms[:old]
+            place = bisect_left(stamps, stamp)
+            if stamps[place] == stamp:
+                transforms[place] = transform
+            else:
+                stamps.insert(place, stamp)
+                transforms.insert(place, transform)
+        if stamps[0] < stamps[-1] - history or len(stamps) > MOST:
+            old = bisect_left(stamps, stamps[-1] - history)
+            old = max(old, len(stamps) - MOST)
+            del stamps[:old], transforms[:old]
 
     def at(self, time: float, gap: float, ahead: float = 0.0) -> Transform:
         """Return the transform at a time.

@@ -3,6 +3,7 @@
 import math
 import struct
 from collections.abc import Callable
+from functools import lru_cache
 from typing import cast
 
 from webmap.base.geometry import Affine
@@ -18,6 +19,7 @@ from webmap.scene.wire.opcodes import (
     STOP,
     TAGS,
     Op,
+    new_varint,
     string,
     varint,
 )
@@ -31,7 +33,10 @@ EVENT_NUMBER = {kind: index for index, kind in enumerate(EVENTS)}
 _POSE = struct.Struct("<fff").pack
 _FAR_POSE = struct.Struct("<ddf").pack
 _MATRIX = struct.Struct("<6d").pack
+isfinite = math.isfinite
 _FLOAT = struct.Struct("<f").pack
+# A member of an enum has a hash that is written in Python.
+_DELTA, _AGE, _POSE_OP = int(Op.DELTA), int(Op.AGE), int(Op.POSE)
 _FAR = 4096.0
 """Metres beyond which the error of single precision exceeds half a millimetre."""
 
@@ -41,17 +46,21 @@ class _Memo:
 
     __slots__ = ("changes", "revision", "snapshot")
 
-    def __init__(self, revision: int) -> None:
-        self.revision = revision
+    def __init__(self) -> None:
+        self.revision = -1
         self.changes: dict[int, bytes | None] = {}
         self.snapshot: bytes | None = None
 
 
 def _memo(fragment: Fragment) -> _Memo:
-    memo = fragment.memo
-    if memo is None or memo.revision != fragment.revision:
-        memo = fragment.memo = _Memo(fragment.revision)
-    return cast("_Memo", memo)
+    memo = cast("_Memo | None", fragment.memo)
+    if memo is None:
+        memo = fragment.memo = _Memo()
+    if memo.revision != fragment.revision:
+        memo.revision = fragment.revision
+        memo.changes.clear()
+        memo.snapshot = None
+    return memo
 
 
 def encode_changes(fragment: Fragment, since: int) -> bytes | None:
@@ -66,12 +75,10 @@ def encode_changes(fragment: Fragment, since: int) -> bytes | None:
         None if a snapshot is needed.
 
     """
-    memo = _memo(fragment)
-    try:
-        return memo.changes[since]
-    except KeyError:
-        data = memo.changes[since] = _encode_changes(fragment, since)
-        return data
+    changes = _memo(fragment).changes
+    if since not in changes:
+        changes[since] = _encode_changes(fragment, since)
+    return changes[since]
 
 
 def encode_snapshot(fragment: Fragment) -> bytes:
@@ -85,16 +92,28 @@ def encode_snapshot(fragment: Fragment) -> bytes:
     return memo.snapshot
 
 
+@lru_cache(maxsize=1 << 15)
+def _op_and_id(op: int, id: int) -> bytes:
+    return bytes((op, *varint(id)))
+
+
 def delta(fragment: Fragment) -> bytes:
     """Return the record before the changes of a fragment."""
-    return bytes((Op.DELTA, *varint(fragment.id)))
+    return _op_and_id(_DELTA, fragment.id)
 
 
 def _encode_changes(fragment: Fragment, since: int) -> bytes | None:
+    out = bytearray(delta(fragment))
+    empty = len(out)
+    if fragment.restructured <= since:  # nothing was added or removed
+        fragment.mark_sent()
+        for node, slot in fragment.values_since(since):
+            if slot != "dots":
+                _put_slot(out, node, slot)
+        return bytes(out) if len(out) > empty else b""
     changes = fragment.changes_since(since)
-    if not changes:
-        return None if changes is None else b""
-    out = bytearray()
+    if changes is None:
+        return None
     for change in changes:
         match change:
             case Changed(_, "dots"):
@@ -107,7 +126,7 @@ def _encode_changes(fragment: Fragment, since: int) -> bytes | None:
             case Added(node, after):
                 parent = cast("Element", node.parent).id
                 _put_node(out, node, parent, after.id + AFTER if after else FIRST)
-    return delta(fragment) + bytes(out) if out else b""
+    return bytes(out) if len(out) > empty else b""
 
 
 # Nodes --------------------------------------------------------------------------
@@ -155,9 +174,8 @@ def _slots_of(element: Element) -> list[str]:
     return slots
 
 
-def _head(out: bytearray, op: Op, node: Node) -> None:
-    out.append(op)
-    out += varint(node.id)
+def _head(out: bytearray, op: int, node: Node) -> None:
+    out += _op_and_id(op, node.id)
 
 
 # Values -------------------------------------------------------------------------
@@ -209,7 +227,7 @@ def _put_pose(out: bytearray, element: Element, x: float, y: float, yaw: float) 
     # The angle within one turn is equivalent and keeps its precision.
     yaw = math.remainder(yaw, math.tau)
     if -_FAR < x < _FAR and -_FAR < y < _FAR:
-        _head(out, Op.POSE, element)
+        _head(out, _POSE_OP, element)
         out += _POSE(x, y, yaw)
     else:
         _head(out, Op.FAR_POSE, element)
@@ -219,8 +237,8 @@ def _put_pose(out: bytearray, element: Element, x: float, y: float, yaw: float) 
 def _put_age(out: bytearray, element: Element) -> None:
     if element._age is not None:
         measured = element._age.measured
-        _head(out, Op.AGE, element)
-        out += varint(max(1, round(measured * 1000)) if math.isfinite(measured) else 0)
+        _head(out, _AGE, element)
+        out += new_varint(max(1, round(measured * 1000)) if isfinite(measured) else 0)
 
 
 def _put_age_limit(out: bytearray, element: Element) -> None:

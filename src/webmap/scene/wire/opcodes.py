@@ -101,15 +101,20 @@ VERSION = zlib.crc32(repr(TABLES).encode()) & 0xFFFF
 """The version of the tables; a page with another one detects the difference."""
 
 
-@lru_cache(maxsize=1 << 12)  # for ids and lengths; ages never repeat
-def varint(number: int) -> bytes:
-    """Return ``number``, which is not negative, with seven bits in each byte."""
+def new_varint(number: int) -> bytes:
+    """Return what :func:`varint` does, for a number that hardly ever comes again."""
     out = bytearray()
     while number > 0x7F:
         out.append(number & 0x7F | 0x80)
         number >>= 7
     out.append(number)
     return bytes(out)
+
+
+@lru_cache(maxsize=1 << 15)
+def varint(number: int) -> bytes:
+    """Return ``number``, which is not negative, with seven bits in each byte."""
+    return new_varint(number)
 
 
 def string(text: str) -> bytes:

@@ -397,7 +397,7 @@ class SceneSession:
             if changes is None:
                 self._pending.send_all = True
                 return None
-            dots = self._dots.records(fragment, known)
+            dots = self._dots.records(fragment, known) if fragment.dotted else b""
             parts += (changes or (delta(fragment) if dots else b""), dots)
             fragments[fragment] = fragment.revision
         parts += [self._place(self._mounts[number]) for number in self._pending.new]
