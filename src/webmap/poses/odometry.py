@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 from webmap.base.audience import RARELY
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.geometry import FARTHEST
-from webmap.base.scope import Removable, Scope, no_scope
+from webmap.base.scope import Removable, Scope, enter_scope, leave_scope
 from webmap.base.tasks import spawn
 from webmap.poses.placing import (
     ODOMETRY_VIEWS,
@@ -244,8 +244,11 @@ class OdometryFeed:
             return
         if self._complaint is not None:
             self._complain(None)
-        with no_scope():  # the listener's resources are not this topic's
+        before = enter_scope(None)  # the listener's resources are not this topic's
+        try:
             self._listener(reading)
+        finally:
+            leave_scope(before)
 
     def _failed(self, text: str, about: object) -> None:
         """Pass on a failure of the bridge; one without a subject does not last."""

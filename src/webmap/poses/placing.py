@@ -112,8 +112,7 @@ class PoseReading(NamedTuple):
             abs(p.x) < FARTHEST
             and abs(p.y) < FARTHEST
             and abs(p.z) < FARTHEST
-            and q.norm > 1e-6
-            and max(abs(q.x), abs(q.y), abs(q.z), abs(q.w)) < FARTHEST
+            and 1e-6 < q.norm < FARTHEST
         )
 
     @property

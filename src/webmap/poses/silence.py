@@ -128,13 +128,16 @@ class SilenceWatch:
         took = self._silence.record(now, period)
         if took is not None:
             log.info("%s: poses again, after %.0f s", self._name(), took)
+        # To ask for the running loop takes longer than all else here.
+        known = self._loop
+        if self._timer is not None and known is not None and not known.is_closed():
+            return
         try:
             loop = asyncio.get_running_loop()
         except RuntimeError:
             return
-        if self._timer is None or self._loop is not loop:
-            self._loop = loop
-            self._look_at(loop, now + self._silence.limit)
+        self._loop = loop
+        self._look_at(loop, now + self._silence.limit)
 
     def expect(self, period: float) -> None:
         """Set the least time between two poses from now on, in seconds."""
