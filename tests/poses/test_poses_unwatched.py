@@ -359,7 +359,7 @@ def test_who_begins_to_look_gets_the_state_of_now(monkeypatch):
     play(script, monkeypatch)
 
 
-def test_the_more_robots_a_bridge_has_the_fewer_poses_of_each_are_requested():
+def test_the_more_robots_there_are_the_fewer_poses_of_each_are_requested():
     bridge = Bridge("ws://robot:9090")
     robots = [Robot(str(number)) for number in range(21)]
     fixed = Robot("fixed")

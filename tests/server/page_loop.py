@@ -9,7 +9,6 @@ from pathlib import Path
 
 from webmap.core.base_page import PageEntry, Viewer
 from webmap.core.runtime import Runtime
-from webmap.scene.node import frame_request
 from webmap.server.files import Published
 from webmap.server.open_pages import OpenPages
 
@@ -40,10 +39,8 @@ class Loop:
             runtime._loop = asyncio.get_running_loop()
             runtime._thread = self.thread
             self.over = asyncio.Event()
-            frame_request.listen(runtime._on_change)
             self.ready.set()
             await self.over.wait()
-            frame_request.listen(None)
 
         asyncio.run(live())
 

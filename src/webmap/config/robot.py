@@ -42,7 +42,8 @@ class OdometryConfig(TopicConfig, kw_only=True, frozen=True):
     """If not given, the bridge is queried."""
     throttle: Annotated[int, checks.milliseconds] | None = None
     """The least time between two messages, in milliseconds; if not given, 16 for up to
-    6 robots of a bridge, 33 up to 13, 50 up to 20, and 100 for more."""
+    6 robots, 33 up to 13, 50 up to 20, 100 up to 1,000 and behind an agent, else 200.
+    """
     bridge: str = ""
 
 

@@ -168,9 +168,10 @@ class Runtime:
 
     def watch(self, watcher: Watcher) -> Removal:
         """Tick ``watcher`` until the removal; called in the model's thread."""
+        if not self._watchers:
+            frame_request.listen(self._on_change)
         self._watchers[id(watcher)] = watcher
         if self._next_frames is None:
-            frame_request.renew()
             self._make_frames_in(REST)
         opened = audience.page_opened()
 
@@ -178,6 +179,7 @@ class Runtime:
             opened.remove()
             self._watchers.pop(id(watcher), None)
             if not self._watchers:
+                frame_request.listen(None)
                 frame_pace.end()
 
         return Removal(undo)
@@ -215,7 +217,6 @@ class Runtime:
             for motion in list(robot_motions):
                 motion.declare_or_complain()
             ready.set()
-            frame_request.listen(self._on_change)
             await self._ending.wait()
         finally:
             frame_request.listen(None)
@@ -249,7 +250,7 @@ class Runtime:
     def _make_frames(self) -> None:
         now, number = time.monotonic(), 0
         frame_pace.prepare()
-        frame_request.renew()
+        frame_request.begin()
         for watcher in list(self._watchers.values()):
             try:
                 number += watcher.tick(now)

@@ -198,8 +198,8 @@ class VisibleRobot(MovableRobot):
             bridge: The connection to the ROS system that has the topic.
             topic: The topic.
             throttle: The least time between two messages, in milliseconds; if not
-                given, 16 for up to 6 robots of a bridge, 33 up to 13, 50 up to 20, and
-                100 for more.
+                given, 16 for up to 6 robots, 33 up to 13, 50 up to 20, 100 up to 1,000
+                and behind an agent, else 200.
             type: The message type.
 
         Raises:

@@ -4,7 +4,6 @@ import asyncio
 import time
 from collections.abc import Callable
 from typing import Any
-from weakref import WeakKeyDictionary
 
 from webmap.base.audience import RARELY
 from webmap.base.errors import ConfigError, ProtocolError
@@ -28,26 +27,23 @@ ODOMETRY = "nav_msgs/Odometry"
 
 _NAMES = {view: name for name, view in ODOMETRY_VIEWS.items()}
 
-THROTTLES = ((6, 16), (13, 33), (20, 50))
-"""The throttle, in milliseconds, of up to so many robots of a bridge that name none: 60
-poses a second of a few robots, and 400 of all together."""
+THROTTLES = ((6, 16), (13, 33), (20, 50), (1000, 100))
+"""The throttle, in milliseconds, of up to so many robots that name none: 60 poses a
+second of a few robots, and 10,000 of all together."""
 
-MANY = 100
-"""The throttle of more robots, and of those behind an agent, in milliseconds."""
+MOST = 200
+"""The throttle of more robots, in milliseconds."""
+
+FAR = 100
+"""The throttle of a robot behind an agent, whose link may be slow, in milliseconds."""
 
 
 class SharedThrottle:
-    """The throttle of the robots of one bridge that name none.
+    """The throttle of all robots of this process that name none."""
 
-    Args:
-        url: The address of the bridge.
-
-    """
-
-    def __init__(self, url: str) -> None:
-        self.value = MANY if is_agent_url(url) else THROTTLES[0][1]
+    def __init__(self) -> None:
+        self.value = THROTTLES[0][1]
         """The least time between two messages of a robot, in milliseconds."""
-        self._is_fixed = is_agent_url(url)
         self._feeds: dict[OdometryFeed, None] = {}
 
     def join(self, feed: "OdometryFeed") -> None:
@@ -56,20 +52,20 @@ class SharedThrottle:
         self._update()
 
     def leave(self, feed: "OdometryFeed") -> None:
-        """Count a feed no more."""
+        """Count a feed no more; does nothing if it is not counted."""
         self._feeds.pop(feed, None)
         self._update()
 
     def _update(self) -> None:
         count = len(self._feeds)
-        value = next((value for most, value in THROTTLES if count <= most), MANY)
-        if value != self.value and not self._is_fixed:
+        value = next((value for most, value in THROTTLES if count <= most), MOST)
+        if value != self.value:
             self.value = value
             for feed in list(self._feeds):
                 feed.change_pace()
 
 
-_shared_throttles: WeakKeyDictionary[Bridge, SharedThrottle] = WeakKeyDictionary()
+_shared = SharedThrottle()
 
 
 class OdometryFeed:
@@ -79,7 +75,7 @@ class OdometryFeed:
         bridge: The connection to the ROS system that has the topic.
         topic: The topic.
         throttle: The least time between two messages, in milliseconds; None for that of
-            all robots of the bridge, see :data:`THROTTLES`.
+            all robots that name none, see :data:`THROTTLES`.
         type: The message type; if not given, the bridge is queried, and the fields of
             the first message are examined.
         listener: Called with each pose, in the model's thread.
@@ -111,11 +107,7 @@ class OdometryFeed:
         self.throttle = throttle
         self.type: str | None = None
         self._unwatched = RARELY
-        self._shared: SharedThrottle | None = None
-        if throttle is None:
-            if bridge not in _shared_throttles:
-                _shared_throttles[bridge] = SharedThrottle(bridge.url)
-            self._shared = _shared_throttles[bridge]
+        self._shares = throttle is None and not is_agent_url(bridge.url)
         self._listener = listener
         self._typed = typed
         self._on_complaint = complain
@@ -126,8 +118,8 @@ class OdometryFeed:
         )
         self._subscription: Subscription | None = None
         self._type_query: Removable | None = None
-        if self._shared is not None:
-            self._shared.join(self)
+        if self._shares:
+            _shared.join(self)
         if type is None:
             self._type_query = TypeQuery(
                 bridge, topic, self._on_type, self._listen_untyped
@@ -137,8 +129,10 @@ class OdometryFeed:
 
     @property
     def _asked(self) -> SubscriptionOptions:
-        throttle = self.throttle if self._shared is None else self._shared.value
-        return SubscriptionOptions(throttle=throttle or 0, unwatched=self._unwatched)
+        throttle = FAR if self.throttle is None else self.throttle
+        if self._shares:
+            throttle = _shared.value
+        return SubscriptionOptions(throttle=throttle, unwatched=self._unwatched)
 
     @property
     def period(self) -> float:
@@ -164,8 +158,7 @@ class OdometryFeed:
             if thing is not None:
                 thing.remove()
         self._subscription = self._type_query = None
-        if self._shared is not None:
-            self._shared.leave(self)
+        _shared.leave(self)
 
     def _listen_untyped(self) -> None:
         """Determine the type from the first message: the bridge may not know the type.

@@ -317,6 +317,7 @@ class Topic:
         self._found: dict[type[ProtocolError], ProtocolError | None] = {}
         """The reason for each kind of error; None while it is searched for."""
         self._latest: ReceivedMessage | None = None
+        self._may_be_latched = True
 
     @property
     def message_type(self) -> str | None:
@@ -344,6 +345,12 @@ class Topic:
     def add(self, listener: Subscription) -> None:
         """Add ``listener``, and subscribe to more if it needs more."""
         self.listeners[listener] = None
+        type = self.message_type
+        self._may_be_latched = (
+            type is None
+            or self.name in _LATCHED_TOPICS
+            or is_type(type, *_LATCHED_TYPES)
+        )
         if self._fault is not None:
             listener.report(self._fault)
         self._changed(self)
@@ -403,7 +410,7 @@ class Topic:
                 self.failing.add(TooLarge)
                 self._determine_reason(error, None)
                 return False
-        self._latest = message
+        self._latest = message if self._may_be_latched or self.count == 1 else None
         if size > LARGE and self.replay is None:  # too large to keep for nothing
             self._latest = None
         return True

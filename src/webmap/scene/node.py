@@ -12,31 +12,45 @@ _fragment_ids = itertools.count(1)
 
 
 class FrameRequest:
-    """The request for a frame, made by the first change after each frame."""
+    """The request for frames, made by the first change after the last ones."""
 
     def __init__(self) -> None:
         self.is_made = True
-        """Whether a frame is requested; always, while nobody makes frames."""
+        """Whether frames are requested; always, while nobody makes frames."""
+        self.number = 0
+        """The number of the next frames; :meth:`begin` counts."""
+        self.changed: list[Fragment] = []
+        """The fragments that had changed before the frames that are being made."""
+        self._changing: list[Fragment] = []
         self._listener: Callable[[], object] | None = None
 
     def listen(self, listener: Callable[[], object] | None) -> None:
         """Call ``listener`` for each request, until there is another one or None."""
         self._listener = listener
-        self.is_made = listener is None
+        self.begin()
 
     def make(self) -> None:
-        """Request a frame, unless one is requested already."""
+        """Request frames, unless they are requested already."""
         if not self.is_made and self._listener is not None:
             self.is_made = True
             self._listener()
 
-    def renew(self) -> None:
-        """Set that a frame is about to be made: a change after it needs another."""
+    def note(self, fragment: "Fragment") -> None:
+        """Request frames with the changes of a fragment."""
+        fragment.noted = self.number
+        if self._listener is not None:
+            self._changing.append(fragment)
+            self.make()
+
+    def begin(self) -> None:
+        """Set that frames are made now: a change after them needs others."""
         self.is_made = self._listener is None
+        self.number += 1
+        self.changed, self._changing = self._changing, []
 
 
 frame_request = FrameRequest()
-"""The request for a frame of this process."""
+"""The request for frames of this process."""
 
 
 class Node:
@@ -260,6 +274,8 @@ class Fragment:
         """The revision at which a node was last added or removed."""
         self.urgent = 0
         """The revision of the newest change that pages get at once; newer ones wait."""
+        self.noted = -1
+        """The number of the frames that a change was last noted for."""
         self.memo: Any = None
         """A cache of the encoder; no part of the scene."""
         self.dotted: dict[int, Node] = {}
@@ -300,8 +316,8 @@ class Fragment:
         self.revision = revision = self.revision + 1
         if not waits:
             self.urgent = revision
-            if not frame_request.is_made:
-                frame_request.make()
+            if self.noted != frame_request.number:
+                frame_request.note(self)
         node._slots[slot] = node._changed = revision
         if slot == "dots":
             self.dotted[node.id] = node
@@ -312,14 +328,14 @@ class Fragment:
     def put_in(self, node: Node) -> None:
         """Record that ``node`` was added to the tree."""
         self.revision = self.restructured = self.urgent = self.revision + 1
-        frame_request.make()
+        frame_request.note(self)
         self._added[node.id] = node
         self._adopt(node)
 
     def take_out(self, node: Node) -> None:
         """Record that ``node`` is removed from the tree."""
         self.revision = self.restructured = self.urgent = self.revision + 1
-        frame_request.make()
+        frame_request.note(self)
         # A node that was never sent needs no removal.
         if node._attached <= self._sent:
             self._removed.append((self.revision, node.id))

@@ -75,6 +75,7 @@ class SceneSession:
         self._numbers = itertools.count(1)
         self._frame = 0
         self._seen = 0
+        self._frames_number = 0  # of the last frames with all changes until then
         self._waits = False  # whether changes may wait for an answer of the page
         self._spoke = math.inf
         self._late = -math.inf  # when an answer of the page was late
@@ -387,10 +388,14 @@ class SceneSession:
 
         """
         parts: list[bytes | bytearray] = [self._pending.gone]
-        fragments = self._fragments
-        for fragment, known in fragments.items():
+        fragments, due = self._fragments, self._dots.due
+        # A page with everything until the last frames needs what changed since.
+        last, self._frames_number = self._frames_number, frame_request.number
+        some = not ages and not due and last == frame_request.number - 1
+        for fragment in frame_request.changed if some else tuple(fragments):
+            known = fragments.get(fragment)
             newest = fragment.revision if ages else fragment.urgent
-            looks = self._dots.due and fragment.dotted
+            looks = due and fragment.dotted
             if known is None or not (known < newest or looks):
                 continue
             changes = encode_changes(fragment, known)
