@@ -12,6 +12,7 @@ import struct
 import sys
 import time
 from collections.abc import Iterable
+from typing import Any
 
 import cbor2
 import numpy as np
@@ -122,7 +123,9 @@ class StampedBridge(WitnessBridge):
     """
 
     def __init__(self, robots: int, beams: int = 0) -> None:
-        super().__init__(lambda _link, _message: None)
+        super().__init__(self._note)
+        self._every: dict[tuple[int, str], int] = {}
+        """The periods from one message of a topic to the next, by connection."""
         self._robots = [Stamped(number) for number in range(robots)]
         self._scans = [Scans(number, beams) for number in range(robots)]
         for number in range(robots):
@@ -138,9 +141,16 @@ class StampedBridge(WitnessBridge):
             due += 1 / RATE / PARTS
             await asyncio.sleep(due - time.monotonic())
             count += 1
-            self._send_part(range(count % PARTS, len(self._robots), PARTS))
+            robots = range(count % PARTS, len(self._robots), PARTS)
+            self._send_part(robots, count // PARTS)
 
-    def _send_part(self, robots: Iterable[int]) -> None:
+    def _note(self, link: int, message: dict[str, Any]) -> None:
+        """Keep the ``throttle_rate`` of a subscription, as a rosbridge does."""
+        if message.get("op") == "subscribe":
+            periods = int(message.get("throttle_rate", 0)) * RATE / 1000
+            self._every[link, str(message.get("topic"))] = max(1, round(periods))
+
+    def _send_part(self, robots: Iterable[int], period: int) -> None:
         """Send the messages of some robots straight to the sockets."""
         shown = set[str]().union(*(each.topics for each in self._sockets.values()))
         now, made = time.monotonic(), {}
@@ -154,8 +164,14 @@ class StampedBridge(WitnessBridge):
             link = socket.connection
             waiting = link.transport.get_write_buffer_size()
             if link.state is State.OPEN and waiting < MOST_WAITING:
-                wanted = socket.topics
-                link.transport.write(b"".join(made[t] for t in made if wanted.get(t)))
+                due = [
+                    made[topic]
+                    for index, topic in enumerate(made)
+                    if socket.topics.get(topic)
+                    and (period + index) % self._every.get((socket.number, topic), 1)
+                    == 0
+                ]
+                link.transport.write(b"".join(due))
 
 
 async def serve(robots: int, beams: int) -> None:
