@@ -433,7 +433,7 @@ class MovableRobot(Extendable):
         self.motion.locate(position.x, position.y, Quaternion(o.x, o.y, o.z, o.w).yaw)
 
     def cancel(self) -> None:
-        """Cancel the robot's goals."""
+        """Cancel the robot's goals, whoever sent them; this needs no control."""
         self.motion.cancel()
 
     def stop(self) -> None:

@@ -177,7 +177,7 @@ class PoseSource:
         return self.feed is None or self._is_needed
 
     def end(self) -> None:
-        """Stop receiving poses."""
+        """Stop receiving poses of the topic and of the frames."""
         self.unfollow()
         self.unplace()
 
@@ -234,7 +234,6 @@ class PoseSource:
             self._robot.set_problem("odometry", text)
 
     def _on_reading(self, reading: PoseReading) -> None:
-        """Process a pose from the topic."""
         feed = self.feed
         if feed is None:
             return
