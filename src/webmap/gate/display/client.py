@@ -295,7 +295,7 @@ class GateClient:
         return [*self._specs.values(), *self._pages.introduction, *stops]
 
     def hear(self, message: FromGate) -> None:
-        """Process a message from the gate."""
+        """Pass a message of the gate to the pages, the program and the listeners."""
         match message:
             case protocol.Tick(tick):
                 self._program.on_tick(tick)
