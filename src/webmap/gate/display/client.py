@@ -308,9 +308,11 @@ class GateClient:
                 self._report(message)
             case protocol.Hello():
                 self._pages.on_hello(message)
-            case protocol.Refused():
+            case protocol.Refused(connection, what=what):
                 self._pages.on_refusal(message)
-                self._report(message)
+                for_page = what == "move" and self._pages.knows(connection)
+                if for_page or connection == self._program.connection:
+                    self._report(message)
             case protocol.CloseConnection():
                 self._pages.on_close(message)
             case protocol.TakeReply():
