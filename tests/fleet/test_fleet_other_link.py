@@ -1,9 +1,13 @@
 """Another kind of link: a bridge uses it, and its robots can only be watched."""
 
-from types import SimpleNamespace
-from typing import get_args, get_type_hints
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
+from pigeon_link import PigeonLink
 
 from webmap import Bridge, Robot
 from webmap.base.errors import ConfigError
@@ -13,32 +17,37 @@ from webmap.fleet.overrides import Overrides
 from webmap.ros import bridge as bridge_module
 from webmap.ros import names
 
+ROOT = Path(__file__).parents[2]
 URL = "pigeon://loft:7"
+KINDS = """
+from pigeon_link import PigeonLink
+from webmap.ros.bridge import LINKS
+
+
+class OtherConstructor(PigeonLink):
+    def __init__(self, url: str) -> None: ...
+
+
+class OtherMethod(PigeonLink):
+    def publish(self, topic: str) -> None: ...  # type: ignore[override]
+
+
+class OtherGraph(PigeonLink):
+    graph: None  # type: ignore[assignment]
+
+
+LINKS["pigeon"] = PigeonLink
+LINKS["a"] = OtherConstructor  # wrong
+LINKS["b"] = OtherMethod  # wrong
+LINKS["c"] = OtherGraph  # wrong
+LINKS["d"] = dict  # wrong
+"""
 TOPICS = {
     "/odom": "nav_msgs/Odometry",
     "/cmd_vel": "geometry_msgs/Twist",
     "/initialpose": "geometry_msgs/PoseWithCovarianceStamped",
     "/move_base_simple/goal": "geometry_msgs/PoseStamped",
 }
-
-
-class PigeonLink:
-    """A link that has no class in common with that of rosbridge."""
-
-    def __init__(self, url, name, *, opened, closed, received, report):
-        self.url, self.name = url, name
-        self.lane = SimpleNamespace(state="new", last_heard=None, lag=0.0)
-        self.graph = SimpleNamespace(topic_type=None)
-        self.stats, self.trouble, self.over = None, None, None
-
-    def refuse_if_over(self):
-        pass
-
-    def subscribe(self, topic):
-        pass
-
-    def unsubscribe(self, topic):
-        pass
 
 
 @pytest.fixture(autouse=True)
@@ -53,9 +62,30 @@ def test_a_bridge_uses_another_kind_of_link():
     assert isinstance(bridge._link, PigeonLink)
 
 
-def test_the_table_of_links_accepts_any_class():
-    _, kind = get_args(get_type_hints(bridge_module)["LINKS"])
-    assert get_args(kind)[0] is ...
+def test_a_bridge_delivers_the_messages_of_another_kind_of_link():
+    bridge, got = Bridge(URL), []
+    subscription = bridge.subscribe("/odom", got.append)
+    bridge._link.pigeon_came("/odom", b'{"x": 1.5}')
+    subscription.remove()
+    bridge._link.pigeon_came("/odom", b'{"x": 2.5}')
+    assert got == [{"x": 1.5}]
+
+
+@pytest.mark.slow
+def test_mypy_accepts_a_right_kind_of_link_and_refuses_wrong_ones(tmp_path):
+    file = tmp_path / "kinds.py"
+    file.write_text(KINDS)
+    run = subprocess.run(
+        [sys.executable, "-m", "mypy", "--strict", file],
+        cwd=ROOT,
+        env={**os.environ, "MYPYPATH": str(Path(__file__).parent)},
+        capture_output=True,
+        text=True,
+    )
+    found = [int(n) for n in re.findall(r"kinds\.py:(\d+): error: ", run.stdout)]
+    lines = enumerate(KINDS.splitlines(), 1)
+    assert found == [n for n, line in lines if "wrong" in line], run.stdout
+    assert f"Found {len(found)} errors" in run.stdout  # and none in pigeon_link.py
 
 
 def test_a_robot_that_is_found_behind_another_link_is_shown_and_not_driven(caplog):

@@ -346,6 +346,21 @@ class TestPages:
         gate.deliver(protocol.CloseConnection(page.id, "too much"))
         assert received[-1] == "too much"
 
+    def test_a_listener_gets_the_refusals_of_the_program_alone(
+        self, client, page, gate
+    ):
+        reports = []
+        client.on_report(reports.append)
+        own = protocol.Refused(protocol.PROGRAM, "r1", "goal", "Ben has control")
+        for_page = protocol.Refused(page.id, "r1", "move", "Ben has control")
+        others = [
+            protocol.Refused(page.id, "r1", "goal", "Ben has control"),
+            protocol.Refused("ann.4f/c1", "r1", "move", "Ben has control"),
+            protocol.Refused("ann.4f/program", "r1", "goal", "Ben has control"),
+        ]
+        gate.deliver(*others, own, for_page)
+        assert reports == [own, for_page]
+
     def test_a_page_that_may_only_stop_gets_two_ticks_a_second(self, client, gate):
         texts = {"viewer": [], "operator": []}
         for role, received in texts.items():

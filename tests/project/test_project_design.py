@@ -86,3 +86,5 @@ def test_the_style_of_tools_has_no_class_of_a_single_tool() -> None:
     for name in set(re.findall(r"\.(webmap-[\w-]+)", rules)) - {"webmap-console"}:
         assert name in shared or sum(name in tool for tool in tools) > 1, name
     assert not re.findall(r"\.webmap-(?!tool\b)\w+ :where\(input", rules)
+    console = (PACKAGE / "console/tools.css").read_text("utf-8")
+    assert not re.findall(r"\.webmap-(?!export)\w+-word", console)

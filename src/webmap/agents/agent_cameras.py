@@ -157,7 +157,7 @@ class CameraRelay:
         self._send_newest(name, watched, now)
 
     def picture(self, name: Name, data: bytes, now: float) -> None:
-        """Note a picture that came from a camera."""
+        """Send displays a picture of a camera; one of another format is a trouble."""
         watched = self._watched.get(name)
         if watched is None:
             return
@@ -238,7 +238,7 @@ class AgentCameras:
         )
 
     async def stop(self) -> None:
-        """End all downloads."""
+        """End all downloads; called when the agent ends."""
         for pull in self._pulls.values():
             await pull.stop()
 

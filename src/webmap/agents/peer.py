@@ -106,7 +106,7 @@ class Peer:
 
     @property
     def connected(self) -> bool:
-        """Whether the router is connected."""
+        """Whether the sessions with the router are open; else see ``trouble``."""
         return self.trouble is None
 
     def start(self) -> None:

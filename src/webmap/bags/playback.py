@@ -147,7 +147,7 @@ class Playback:
             self._hold(at)
 
     def obey(self, command: PlaybackCommand, now: int) -> None:
-        """Carry out a command."""
+        """Pause, go on, seek or change the rate, at ``now`` in nanoseconds."""
         name, value = command
         if name == "rate":
             self.rate = value
@@ -206,7 +206,7 @@ class PlaybackStatus(msgspec.Struct, frozen=True):
 
 
 class Mark(msgspec.Struct, frozen=True):
-    """An event in a recording."""
+    """An event in a recording, marked on the time line of the player."""
 
     at: float
     """The time, in seconds since the begin of the recording."""

@@ -171,8 +171,6 @@ ASIDE = 1 << 10
 
 @dataclass(slots=True)
 class _Track:
-    """A recorded topic."""
-
     type: str
     version: TypeVersion
     """The type of the newest release, or of the one that fits its messages."""

@@ -22,7 +22,7 @@ class LifecycleService(Protocol):
         """Begin the work; called in the loop's thread."""
 
     async def stop(self) -> None:
-        """Stop all work of the service."""
+        """End the work; :meth:`start` may begin it again."""
 
 
 class Lifecycle:

@@ -108,7 +108,7 @@ class Budgets:
             return suffix
 
     def clear(self) -> None:
-        """Forget all counts."""
+        """Forget all counts, so that every source may log again at once."""
         with self._lock:
             self._sources.clear()
 

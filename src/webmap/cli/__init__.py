@@ -70,7 +70,6 @@ def cli() -> None:
 
 
 def _named_command() -> str | None:
-    """Return the name of the command on the command line."""
     return next((text for text in sys.argv[1:] if text in COMMANDS), None)
 
 

@@ -290,7 +290,7 @@ def milliseconds(value: Any) -> int:
 
 
 def yes_or_no(value: Any) -> bool:
-    """Check a boolean."""
+    """Check a boolean: ``true`` or ``false``, and no number."""
     if not isinstance(value, bool):
         raise ConfigError("true or false")
     return value
@@ -309,14 +309,14 @@ def one_of(*texts: str) -> Check:
 
 
 def array(value: Any) -> list[Any]:
-    """Check an array of arguments."""
+    """Check an array of positional arguments; a tuple becomes a list."""
     if not isinstance(value, list | tuple):
         raise ConfigError("an array of arguments")
     return list(value)
 
 
 def table(value: Any) -> dict[str, Any]:
-    """Check a table of arguments."""
+    """Check a table of arguments by name, and copy it."""
     if not isinstance(value, Mapping):
         raise ConfigError("a table of arguments by name")
     return dict(value)

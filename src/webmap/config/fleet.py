@@ -46,7 +46,7 @@ class BridgeConfig(Config, kw_only=True, frozen=True):
 
 
 class MapConfig(Config, kw_only=True, frozen=True):
-    """A map under the robots."""
+    """A map that a bridge publishes, drawn under the robots."""
 
     bridge: Annotated[str, checks.text] = ""
     """The name of its bridge; the only one if not given."""
@@ -66,7 +66,7 @@ class ImageConfig(Config, kw_only=True, frozen=True):
 
 
 class TilesConfig(Config, kw_only=True, frozen=True):
-    """Tiles of a map of the world."""
+    """Tiles, and the place on the Earth where the map has its origin."""
 
     source: Annotated[str, checks.text]
     latitude: Annotated[float, checks.between(-89.999, 89.999, "degrees")]

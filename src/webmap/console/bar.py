@@ -60,7 +60,7 @@ class BridgeList:
         self.poll()
 
     def poll(self) -> None:
-        """Update the list."""
+        """Show the present state of each router and bridge, and the worst of all."""
         routers = {url: describe() for url, describe in self._routers.items()}
         bridges = {bridge: describe_link(bridge) for bridge in self._bridges}
         for url, state in routers.items():
@@ -167,7 +167,7 @@ class RefusedList:
         self.poll()
 
     def poll(self) -> None:
-        """Update the counts."""
+        """Show the present counts to an administrator, if they changed."""
         rows = refusals.rows
         if not self._may or rows == self._shown:
             return

@@ -38,7 +38,7 @@ class SpeedTable:
         self.elements: list[Element] = [self._table(), self._limits()]
 
     def show(self, robot: "Robot") -> None:
-        """Show the velocities and the speed limit of a robot."""
+        """Show the three velocities, and the speed limit with its reasons."""
         report = robot.report
         sent = echoed = measured = None
         if report is not None:
@@ -214,7 +214,7 @@ class GoalOnCard(Protocol):
 
     @property
     def state(self) -> str:
-        """State of the goal."""
+        """A key of ``GOALS``, such as ``"under way"``."""
 
     @property
     def left(self) -> float | None:
@@ -317,7 +317,7 @@ class RobotHealth:
         self.element.remove()
 
     def on_select(self) -> None:
-        """Show the health of the selected robot."""
+        """Show the diagnostics of another robot at once, not at the next poll."""
         self.poll()
 
     def poll(self) -> None:

@@ -59,7 +59,7 @@ class Console:
         self.alert_watch = AlertWatch(self.alerts, self.shown_robots)
 
     def shown_robots(self) -> "list[Robot]":
-        """Return the robots that the pages show."""
+        """Return the robots of both lists without those that were removed."""
         every = (*self.given, *self.robots)
         return [robot for robot in every if robot not in self._removed]
 

@@ -136,7 +136,7 @@ class RobotCard:
             element.set_age(age)
 
     def show_pose(self) -> None:
-        """Show the robot's pose."""
+        """Show the place in metres, the heading and the velocities, if known."""
         robot = self._robot
         assert robot is not None
         known = robot.valid
@@ -272,7 +272,7 @@ class RobotTriggers:
         self._card.show_state()
 
     def on_battery_update(self, battery: object) -> None:
-        """Show the battery."""
+        """Show the charge and the voltage that the message has."""
         self._card.show_battery(battery)
 
 
@@ -290,7 +290,7 @@ def action(act: str, symbol: str, words: str) -> "Element":
 
 
 def stop_test() -> "Element":
-    """Return the button of the stop test."""
+    """Return the button that takes control, and then runs the stop test."""
     words = [html.span(text=text, class_=name) for name, text in TEST_WORDS]
     element = html.button(
         icon("icon-test"), *words, type="button", class_="button", disabled=True

@@ -183,7 +183,7 @@ class Row:
         self.on_state()
 
     def on_battery_update(self, battery: Any) -> None:
-        """Show the charge."""
+        """Show the charge, by which the list may be ordered."""
         self.on_state()
 
     def show_selected(self, selected: bool) -> None:

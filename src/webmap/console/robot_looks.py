@@ -89,7 +89,7 @@ def icon(symbol: str) -> Element:
 
 
 def look_of(robot: "Robot") -> Look:
-    """Return the look of a robot's state."""
+    """Return the symbol, the tone and the group of the robot's state."""
     return LOOKS[robot.state.name]
 
 
@@ -280,7 +280,7 @@ class StateMark:
     audience_changed = on_odometry_update
 
     def on_state(self, state: object = None) -> None:
-        """Show the state."""
+        """Show the symbol of the state; its words only if it needs a person."""
         robot, look = self.robot, look_of(self.robot)
         self._use.set(href=f"#{look.symbol}")
         self._words.text = robot.state.text if look.group in NEED_A_PERSON else ""

@@ -43,7 +43,7 @@ class PageSpeeds:
         return (min(linear), min(angular))
 
     def set(self, module: object, speed: float, rotation_speed: float) -> None:
-        """Set the greatest speeds of a module that drives."""
+        """Set the greatest speeds of a module that drives, in m/s and rad/s."""
         self._most[id(module)] = (speed, rotation_speed)
 
     def drive(self, module: object, on: bool) -> None:
@@ -217,12 +217,12 @@ class BasePage:
         return self._speeds.current
 
     def set_speeds(self, module: object, speed: float, rotation_speed: float) -> None:
-        """Set the greatest speeds of a module of this page that drives."""
+        """Send the gate the greatest speeds of a module, in m/s and rad/s."""
         self._speeds.set(module, speed, rotation_speed)
         self._report_speeds()
 
     def set_driving(self, module: object, on: bool) -> None:
-        """Set whether a module that drives has active input."""
+        """Set whether a module has active input; then its speeds alone count."""
         self._speeds.drive(module, on)
         self._report_speeds()
 

@@ -400,14 +400,16 @@ class MovableRobot(Extendable):
     ) -> None:
         """Send the robot to a goal in the plane, by its own navigation.
 
+        If the gate refuses the goal, ``on_refused`` of the robot's modules is called
+        with the reason, which the page of ``by`` shows too.
+
         Args:
             position: The goal of the base link, in metres on the common map; ``z`` is
                 ignored.
             orientation: The orientation at the goal; only the heading is used.
             by: The page whose viewer has asked for this, such as ``event.page`` of a
                 press. The goal is then one of this viewer, who keeps control, or gets
-                it if the robot is free; the page shows it if the gate refuses. Without
-                it the program needs control itself.
+                it if the robot is free. Without it the program needs control itself.
 
         Raises:
             NoLease: If the program does not have control, without ``by``.
@@ -433,7 +435,7 @@ class MovableRobot(Extendable):
         self.motion.locate(position.x, position.y, Quaternion(o.x, o.y, o.z, o.w).yaw)
 
     def cancel(self) -> None:
-        """Cancel the robot's goals."""
+        """Cancel the robot's goals, whoever sent them; this needs no control."""
         self.motion.cancel()
 
     def stop(self) -> None:

@@ -182,7 +182,7 @@ class PoseSource:
         return self.feed is None or self._is_needed
 
     def end(self) -> None:
-        """Stop receiving poses."""
+        """Stop receiving poses of the topic and of the frames."""
         self.unfollow()
         self.unplace()
 

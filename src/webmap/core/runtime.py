@@ -26,6 +26,7 @@ from webmap.core.refusals import refusals
 from webmap.core.visible_robot import robots
 from webmap.gate.protocol import (
     GateDown,
+    Refused,
     RefusedCount,
     Report,
     RobotReport,
@@ -287,6 +288,8 @@ class Runtime:
             robot.on_written("move", goal_message(report))
         elif isinstance(report, SentPose):
             robot.expect_jump()
+        elif isinstance(report, Refused):
+            robot.notify_modules("on_refused", report.what, report.why)
 
 
 def twist_message(sent: SentTwist) -> dict[str, Any]:

@@ -91,7 +91,7 @@ def leads_further(robot: FoundRobot, known: FoundRobot) -> bool:
 
 
 def with_frames_of(robot: FoundRobot, known: FoundRobot) -> FoundRobot:
-    """Return a robot with the frames of another one."""
+    """Return ``robot``, placed by the frames that are ``known``."""
     return replace(
         robot,
         base_frame=known.base_frame,

@@ -321,7 +321,6 @@ def shared_map(found: FoundRobot) -> str:
 def _with_settings(
     robot: FoundRobot, settings: Sequence[Setting], dialect: str | None
 ) -> FoundRobot:
-    """Return a robot with its settings applied."""
     guesses = dict(robot.guesses)
     dialect = dialect or _dialect(robot)
     for setting in settings:

@@ -44,7 +44,7 @@ class ScanFold(msgspec.Struct, frozen=True):
 
 
 class Scan(msgspec.Struct, frozen=True):
-    """A laser scan."""
+    """A laser scan for scan assist, in the sensor's frame."""
 
     angle_min: float
     angle_increment: float

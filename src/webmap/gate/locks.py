@@ -71,7 +71,7 @@ class Locks:
         self._held: dict[Key, int] = {}
 
     def acquire(self, key: Key) -> LockState:
-        """Try to lock a machine."""
+        """Lock a machine; the answer has the reason if another gate has it."""
         try:
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
             file = _open_locked(self._path(key))
@@ -108,7 +108,7 @@ class Locks:
                 os.close(file)
 
     def release(self, key: Key) -> None:
-        """Release the lock of a machine."""
+        """Unlock a machine; no effect if this gate does not have its lock."""
         file = self._held.pop(key, None)
         if file is not None:
             os.close(file)

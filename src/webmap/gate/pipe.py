@@ -27,7 +27,7 @@ _encode = msgspec.msgpack.Encoder().encode
 
 
 def pack(message: msgspec.Struct) -> bytes:
-    """Return the frame of a message."""
+    """Return a message in MessagePack, after four bytes with its length."""
     body = _encode(message)
     return _length.pack(len(body)) + body
 
@@ -103,7 +103,7 @@ class PipeWriter:
         self._thread.start()
 
     def put(self, message: FromGate) -> None:
-        """Queue a message."""
+        """Queue a message; of a full queue, those that are soon repeated are lost."""
         waiting = self._queue.qsize()
         if waiting > OVERFULL:
             return
@@ -139,7 +139,7 @@ class BackgroundHandler(logging.Handler):
         self._thread.start()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Queue a record."""
+        """Queue a record; it is lost if the queue is full."""
         with contextlib.suppress(queue.Full):
             self._records.put_nowait(record)
 

@@ -394,7 +394,7 @@ class Tick(msgspec.Struct, frozen=True, tag="tick"):
 
 
 class Refused(msgspec.Struct, frozen=True, tag="refused"):
-    """A command was not executed; its page shows why."""
+    """A command was not executed; its page or its program gets the reason."""
 
     connection: str
     robot: str | None

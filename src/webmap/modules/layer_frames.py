@@ -112,7 +112,7 @@ class LayerFrames:
         raise NotImplementedError
 
     def _on_frames(self) -> None:
-        """Process changed frames."""
+        """Draw by the new frames; each subclass implements this."""
         raise NotImplementedError
 
 

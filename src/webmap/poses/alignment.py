@@ -82,7 +82,7 @@ class Alignments:
         return self._marks[bridge]
 
     def set(self, bridge: Bridge, pose: Pose) -> None:
-        """Set the alignment of a bridge."""
+        """Set the alignment of a bridge, and call those who draw by it."""
         self._poses[bridge] = pose
         for listener in tuple(self._listeners.get(bridge, {}).values()):
             listener()

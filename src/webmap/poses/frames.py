@@ -69,7 +69,7 @@ class FrameFaults:
 
     @property
     def any(self) -> bool:
-        """Whether there is a fault."""
+        """Whether a fault of any transform is kept now."""
         return bool(self._faults)
 
     def note(

@@ -54,7 +54,7 @@ _HERE = Pose()
 
 
 class Problem(NamedTuple):
-    """A current problem."""
+    """What is wrong now with the frames or the jumps of a robot's poses."""
 
     kind: str
     """The kind; sentences of one kind may differ, for example in their numbers."""

@@ -92,7 +92,7 @@ class PoseReading(NamedTuple):
 
     @classmethod
     def of(cls, message: OdometryView) -> "PoseReading":
-        """Return the pose of a decoded message."""
+        """Return the pose of a message, with velocity if it is odometry."""
         place = message.place
         p, q = place.position, place.orientation
         return cls(

@@ -19,6 +19,7 @@ from webmap.base.scope import Removal, keep
 from webmap.ros.callbacks import Callback, Callbacks
 from webmap.ros.definitions import Definitions
 from webmap.ros.fan_out import FanOut
+from webmap.ros.link import LinkType
 from webmap.ros.motion_topics import written_behind
 from webmap.ros.names import normalise_topic, normalise_url, same_type, split_type
 from webmap.ros.received_message import BridgeStats, LinkState, ReceivedMessage
@@ -34,15 +35,14 @@ from webmap.ros.topic_faults import TopicFaults
 
 log = logging.getLogger("webmap.ros")
 
-LINKS: dict[str, Callable[..., Any]] = {"ws": RosbridgeLink, "wss": RosbridgeLink}
+LINKS: dict[str, LinkType] = {"ws": RosbridgeLink, "wss": RosbridgeLink}
 """The kind of link by the scheme of the URL: *A new kind of link* in the design."""
 
 _HOMES = {"zenoh": "webmap.agents.link", "zenohs": "webmap.agents.link"}
 """Modules that add a kind of link when they are imported."""
 
 
-def _link_type(url: str) -> Callable[..., RosbridgeLink]:
-    # Another kind has the methods and attributes of this one.
+def _link_type(url: str) -> LinkType:
     scheme = url.partition(":")[0]
     if scheme not in LINKS:
         importlib.import_module(_HOMES[scheme])
@@ -362,7 +362,7 @@ class Bridge:
             BridgeClosed: If the connection cannot be opened.
 
         """
-        return await self._link.definitions(type, kind)
+        return await self._graph.definitions(type, kind)
 
     async def time(self) -> float | None:
         """Return the time of the ROS system in seconds since 1970.

@@ -27,7 +27,7 @@ class FanOut:
         self._loop = loop
 
     async def stop(self) -> None:
-        """Stop decoding."""
+        """Cancel the decoding of large messages; they are not delivered."""
         await self._offload.stop()
 
     def offer(

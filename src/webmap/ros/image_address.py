@@ -84,7 +84,6 @@ _MEANT = f"the address of a camera begins with http:// or https://, as {EXAMPLE}
 
 
 def _without_user(text: str) -> str:
-    """Return an address without user and password."""
     scheme, slashes, rest = text.partition("://")
     host, slash, path = rest.partition("/")
     return scheme + slashes + host.rpartition("@")[2] + slash + path

@@ -95,7 +95,7 @@ class MessageCheck:
         """Handle an absent field: here, leave it absent."""
 
     def array(self, field: Field, value: Any) -> Any:
-        """Return the value of an array field."""
+        """Return an array of the right size, each of whose elements was checked."""
         if not isinstance(value, list | tuple):
             raise wrong(value, expectation(field))
         check_size(field, value)
@@ -120,7 +120,7 @@ class MessageCheck:
         return self.text(field, value) if field.type == "string" else self.truth(value)
 
     def number(self, field: Field, value: Any) -> float:
-        """Return a floating-point number."""
+        """Return a finite number that the type of the field can hold."""
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise wrong(value, "a number")
         if not abs(value) <= FLOATS[field.type]:  # NaN or infinite
@@ -128,7 +128,7 @@ class MessageCheck:
         return float(value)
 
     def whole(self, field: Field, value: Any) -> int:
-        """Return an integer."""
+        """Return an integer that the type of the field can hold."""
         low, high = INTEGERS[field.type]
         if isinstance(value, bool) or not isinstance(value, int):
             raise wrong(value, expectation(replace(field, is_array=False)))
@@ -137,13 +137,13 @@ class MessageCheck:
         return value
 
     def truth(self, value: Any) -> bool:
-        """Return a boolean."""
+        """Return a boolean; 0 and 1 are refused."""
         if not isinstance(value, bool):
             raise wrong(value, "true or false")
         return value
 
     def text(self, field: Field, value: Any) -> str:
-        """Return a string."""
+        """Return a string that is not longer than the field allows."""
         longest = MAX_TEXT if field.longest is None else field.longest
         if not isinstance(value, str) or len(value) > longest:
             raise wrong(value, expectation(replace(field, is_array=False)))

@@ -374,7 +374,7 @@ class TransformMsg(msgspec.Struct, frozen=True, gc=False):
 
     @property
     def planar(self) -> Pose:
-        """The transform in the plane."""
+        """The transform seen from above: x and y in metres, yaw in radians."""
         place = self.translation
         return Pose(place.x, place.y, self.rotation.quaternion.yaw)
 

@@ -51,7 +51,7 @@ class ReceivedMessage:
         return value
 
     def is_decoded(self, type: type[msgspec.Struct] | None) -> bool:
-        """Return whether the message is already decoded as ``type``."""
+        """Return whether a value or an error is stored for ``type``."""
         return type in self._decoded
 
     def prime(self, type: type[msgspec.Struct] | None, value: Any) -> None:

@@ -83,7 +83,7 @@ def view_name(thing: Any) -> str | None:
 
 
 def answer(request: WorkRequest, data: bytes) -> tuple[WorkResult, list[bytes]]:
-    """Return the answer to a request, and its parts."""
+    """Return what a request asks for, in parts; never raises an error."""
     try:
         if request.call is not None:
             made = _named(request.call)(data, *request.arguments)

@@ -112,7 +112,7 @@ class Text(Node):
 
     @property
     def data(self) -> str:
-        """The text."""
+        """The text, which browsers show as it is."""
         return self._data
 
     @data.setter
@@ -294,7 +294,6 @@ class Fragment:
         return f"<Fragment {self.id} of {self.root!r} at {self.revision}>"
 
     def __len__(self) -> int:
-        """Return the number of nodes in the fragment."""
         return len(self._nodes)
 
     def find(self, node_id: int) -> Node | None:

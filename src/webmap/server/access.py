@@ -182,7 +182,7 @@ def _headers(scope: Scope, name: bytes) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class AccessRefusal:
-    """A refused request."""
+    """The HTTP answer to a request that is not allowed."""
 
     status: int
     text: str

@@ -189,7 +189,7 @@ class PageAnswers:
         self._warned: dict[Path, list[str]] = {}
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer one request."""
+        """Answer GET and HEAD; any other method gets status 405."""
         request = Request(scope, receive)
         if request.method not in {"GET", "HEAD"}:
             raise HTTPException(405, headers={"allow": "GET, HEAD"})

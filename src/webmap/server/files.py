@@ -278,7 +278,7 @@ class GzipCache:
         self._bytes = 0
 
     def compressed(self, data: bytes) -> bytes:
-        """Return the content compressed."""
+        """Return ``data`` compressed with gzip, each content once."""
         # Also while another thread compresses: it may be compressing the same.
         with self._lock:
             packed = self._stored.get(data)

@@ -456,7 +456,7 @@ class OpenPages:
             host.close()
 
     def close(self) -> None:
-        """Close every page."""
+        """Close every page for good, without the wait for its viewer."""
         for host in tuple(self._hosts.values()):
             host.close()
 

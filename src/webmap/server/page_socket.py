@@ -56,7 +56,7 @@ REPLACED = 4001
 
 @dataclass(frozen=True, slots=True)
 class SocketLimits:
-    """The limits of one socket."""
+    """How much a page may send over one socket."""
 
     max_bytes: int
     """The greatest message size, in bytes of UTF-8."""

@@ -292,15 +292,15 @@ class GraphNode:
         return None
 
     def publish(self, topic: str, message: dict[str, Any]) -> None:
-        """Publish on a topic of this node."""
+        """Deliver a message to all who subscribe to the topic now."""
         self.graph.publish(self, topic, message)
 
     def advertise(self, topic: str, type_name: str, *, latch: bool = False) -> None:
-        """Advertise a topic of this node."""
+        """Advertise a topic; with ``latch``, later subscribers get its last message."""
         self.graph.advertise(self, topic, type_name, node=NODE, latch=latch)
 
     def subscribe(self, topic: str, type_name: str, callback: Deliver) -> None:
-        """Subscribe this node to a topic."""
+        """Call ``callback`` with each message of a topic from now on."""
         self.graph.subscribe(self, topic, callback, type_name, node=NODE)
 
 

@@ -24,7 +24,7 @@ _MOST_KEPT = 1 << 18
 
 @dataclass(frozen=True, slots=True)
 class ScannerOptions:
-    """The properties of a scanner."""
+    """What a laser scanner measures: rays, ranges and faults."""
 
     beams: int = 360
     """Rays of one sweep, over the full circle from -pi, counter-clockwise."""

@@ -99,7 +99,7 @@ class HttpError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class PictureRequest:
-    """The requested picture or stream."""
+    """What an HTTP request asks for: the list of topics, a stream or one picture."""
 
     what: Literal["list", "stream", "snapshot"]
     topic: str = ""

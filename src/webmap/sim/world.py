@@ -122,7 +122,7 @@ _STATIONS = 2
 
 @dataclass(frozen=True, slots=True)
 class WorldOptions:
-    """The options of a world."""
+    """What a world contains, and what its robots do by themselves."""
 
     robots: int = 2
     seed: int = 1

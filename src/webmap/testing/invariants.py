@@ -19,7 +19,7 @@ from webmap.base.geometry import Twist
 
 @dataclass(frozen=True, slots=True)
 class ClientMessage:
-    """One message of a client."""
+    """One message that a client sent to the robot's rosbridge."""
 
     at: float
     """Seconds of the monotonic clock."""
@@ -187,7 +187,7 @@ RAMP_INTERVAL = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Bounds:
-    """The limits of all velocities."""
+    """The limits that no velocity in a log may exceed."""
 
     v_max: float = math.inf
     """Metres per second."""

@@ -221,7 +221,7 @@ class WitnessRobot:
         self.end()
 
     def end(self) -> None:
-        """Stop everything."""
+        """Close all connections and end the thread; the log stays."""
         self._thread.call(self._bridge.stop())
         self._thread.end()
 

@@ -188,7 +188,7 @@ class Measurement:
 
     @property
     def rate(self) -> float:
-        """Messages a second."""
+        """Messages a second; 0 if no time was measured."""
         return self.count / self.seconds if self.seconds else 0.0
 
 

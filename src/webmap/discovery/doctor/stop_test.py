@@ -63,7 +63,7 @@ class StopTestClient:
         self._seq = 0
 
     def receive(self, message: GateMessage, now: float) -> None:
-        """Process a message of the gate."""
+        """Process a message that the gate sends to pages."""
         match message["op"]:
             case "tick":
                 self._tick = message["tick"]

@@ -32,7 +32,7 @@ def is_ready(findings: Sequence[Finding]) -> bool:
 
 
 def report(url: str, findings: Sequence[Finding]) -> str:
-    """Return the findings for a terminal."""
+    """Return the findings for a terminal, with a heading for each robot."""
     lines = [one_line(url)]
     about = ""
     for finding in findings:

@@ -226,7 +226,6 @@ def conditions(robot: "Robot") -> dict[str, str]:
 
 
 def _reported(robot: "Robot") -> dict[str, str]:
-    """Return the conditions that the gate reports."""
     report = robot.report
     if report is None:
         return {}

@@ -69,7 +69,7 @@ class ButtonView:
         self.refresh()
 
     def refresh(self) -> None:
-        """Show the state of the button."""
+        """Show whether and for how long it runs, why it is disabled, the result."""
         button = self.button
         running = button.state == "running"
         why = self._why_disabled()

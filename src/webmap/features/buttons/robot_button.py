@@ -310,7 +310,7 @@ def answer_text(answer: Any) -> str:
 
 
 def value_text(value: Any) -> str:
-    """Return a value as text."""
+    """Return a text as it is, any other value as JSON, and None as "nothing"."""
     if value is None:
         return "nothing"
     if isinstance(value, str):

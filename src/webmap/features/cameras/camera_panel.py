@@ -165,12 +165,12 @@ class CameraPanel:
 
 
 def cameras_of(robot: "Robot | None") -> list[Any]:
-    """Return the cameras among the modules of a robot."""
+    """Return the robot's modules that are cameras; none without a robot."""
     return [] if robot is None else [m for m in robot.modules if is_camera(m)]
 
 
 def is_camera(module: object) -> bool:
-    """Return whether a module of a robot is a camera."""
+    """Return whether a module has the two names that a panel needs of a camera."""
     return hasattr(module, "watch") and hasattr(module, "url")
 
 

@@ -80,7 +80,7 @@ def without_slashes(name: str) -> str:
 
 
 def part_owners(bridge: Bridge, topic: str) -> PartOwners:
-    """Return the robots that follow a topic of a bridge."""
+    """Return what all robots that follow a topic of a bridge share."""
     return _owners.setdefault(bridge, {}).setdefault(topic, PartOwners())
 
 
@@ -156,7 +156,7 @@ class DiagnosticArrayMsg(Stamped, frozen=True, kw_only=True):
 
 @dataclass(frozen=True, slots=True)
 class PartReport:
-    """The last report of one part."""
+    """The newest ``DiagnosticStatus`` of one part, even if it has become stale."""
 
     name: str
     level: str

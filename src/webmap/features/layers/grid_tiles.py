@@ -102,8 +102,6 @@ class _Drawing(NamedTuple):
 
 
 class _Tile:
-    """What is known of one tile."""
-
     def __init__(self) -> None:
         self.picture: Picture | None = None
         """None until it is drawn, and while nothing of it can be seen."""

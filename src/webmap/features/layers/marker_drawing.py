@@ -42,7 +42,7 @@ class ColorMsg(msgspec.Struct, frozen=True, gc=False):
 
 
 class MarkerHeader(Header, frozen=True, gc=False):
-    """The header of a marker."""
+    """A header with ``seq``, by which markers of ROS 1 are recognized."""
 
     seq: int | None = None
     """The number of the message; only ROS 1 has one."""
@@ -95,7 +95,7 @@ SHADES = 16
 
 
 def area_style(colour: ColorMsg) -> dict[str, Any]:
-    """Return the attributes of an area with a colour."""
+    """Return the SVG attributes of an area without an outline."""
     return {"fill": _rgb(colour), "fill_opacity": _alpha(colour)}
 
 
@@ -110,7 +110,7 @@ def line_style(colour: ColorMsg, width: float) -> dict[str, Any]:
 
 
 def colours(marker: MarkerMsg) -> list[ColorMsg]:
-    """Return the colour of each point."""
+    """Return a colour for each point: its own, or that of the marker."""
     return marker.colors or [marker.color] * len(marker.points)
 
 

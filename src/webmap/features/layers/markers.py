@@ -72,7 +72,7 @@ class MarkerFrames(LayerFrames):
         return found
 
     def forget(self, key: object) -> None:
-        """Forget a deleted marker."""
+        """Forget a deleted marker, whose frame need not be known any more."""
         self._moving.pop(key, None)
 
     def report_unknown(self) -> None:

@@ -248,7 +248,7 @@ class OccupancyGrid(MapLayer):
             self._change()
 
     def draw(self, found: "Found", at: Transform) -> None:
-        """Draw the grid."""
+        """Draw a full grid, which replaces all earlier updates."""
         self.info, self.cells = found
         self._updates.clear()
         if not self._report_other_values(self.cells):

@@ -181,5 +181,4 @@ class _Piece:
         return cut
 
     def draw(self) -> None:
-        """Draw the line."""
         self.line.set(points=[(rounded(x), rounded(y)) for x, y in self.points])

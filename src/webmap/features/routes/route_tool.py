@@ -46,7 +46,7 @@ class Route(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class RouteFile(msgspec.Struct, forbid_unknown_fields=True):
-    """The content of a file."""
+    """The content of a file: routes by name, on one map."""
 
     map: str
     routes: dict[str, Route] = {}

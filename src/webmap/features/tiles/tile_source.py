@@ -42,7 +42,7 @@ class Tile(NamedTuple):
 
 
 class Source(Protocol):
-    """A source of tiles."""
+    """Where tiles come from: a folder, or an MBTiles file."""
 
     attribution: str
 
@@ -180,7 +180,7 @@ class MBTiles:
         self.zooms: Sequence[int] = self._levels(known)
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the database, after a tile that another thread reads now."""
         with self._lock:
             self._database.close()
 

@@ -295,7 +295,7 @@ class GateClient:
         return [*self._specs.values(), *self._pages.introduction, *stops]
 
     def hear(self, message: FromGate) -> None:
-        """Process a message from the gate."""
+        """Pass a message of the gate to the pages, the program and the listeners."""
         match message:
             case protocol.Tick(tick):
                 self._program.on_tick(tick)
@@ -308,9 +308,11 @@ class GateClient:
                 self._report(message)
             case protocol.Hello():
                 self._pages.on_hello(message)
-            case protocol.Refused():
+            case protocol.Refused(connection, what=what):
                 self._pages.on_refusal(message)
-                self._report(message)
+                for_page = what == "move" and self._pages.knows(connection)
+                if for_page or connection == self._program.connection:
+                    self._report(message)
             case protocol.CloseConnection():
                 self._pages.on_close(message)
             case protocol.TakeReply():

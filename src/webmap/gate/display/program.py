@@ -57,7 +57,7 @@ class ProgramCommands:
         clock: Callable[[], float] = time.monotonic,
         connection: str = PROGRAM,
     ) -> None:
-        self._connection = connection
+        self.connection = connection
         self._send = send
         self._lock = lock
         self._clock = clock
@@ -204,7 +204,7 @@ class ProgramCommands:
         """Note whether this program holds a robot's lease now."""
         holder = None if report.holder is None else report.holder.connection
         with self._lock:
-            if holder != self._connection or report.epoch is None:
+            if holder != self.connection or report.epoch is None:
                 self._epochs.pop(report.robot, None)
                 self._passed_on.pop(report.robot, None)
                 self._releases.pop(report.robot, None)
@@ -213,7 +213,7 @@ class ProgramCommands:
 
     def on_take_reply(self, reply: protocol.TakeReply) -> None:
         """Set the result of a :meth:`take` of this program."""
-        if reply.connection != self._connection:
+        if reply.connection != self.connection:
             return
         with self._lock:
             answered = self._takes.pop(reply.request, None)

@@ -62,7 +62,7 @@ class StopHooks:
                 self._failed[place_of(hook)] = NO_LINK
 
     def ended(self, event: HookEnded) -> None:
-        """Note the result of a hook."""
+        """Note the result of a hook, if the hooks were not sent again since."""
         if event.number != self._number:
             return
         if event.why is None:

@@ -105,7 +105,7 @@ class Epochs:
         self._next = secrets.randbits(31) if first is None else first
 
     def next(self) -> int:
-        """Return the next number."""
+        """Return the epoch of a new lease."""
         self._next += 1
         return self._next
 

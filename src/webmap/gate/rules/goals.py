@@ -85,12 +85,12 @@ class Goals:
 
     @property
     def can_send(self) -> bool:
-        """Whether goals can be sent to this robot."""
+        """Whether the robot has an action or a topic for goals."""
         return self.method is not None
 
     @property
     def can_cancel(self) -> bool:
-        """Whether goals of this robot can be cancelled."""
+        """Whether the robot has an action, or a topic to cancel goals."""
         return self.spec.cancel_topic is not None or self.spec.action is not None
 
     @property
@@ -168,7 +168,7 @@ class Goals:
         self._emit(SendPose(self._key, self.spec.id, x, y, yaw, by, until))
 
     def on_written(self, goal: GoalWritten, now: float) -> None:
-        """Note that a goal was written."""
+        """Note a goal that was written: from now on the robot may follow it."""
         self._running, self._by, self._perhaps = goal.id, goal.by, True
         self._heard_at, self._unheard = now, True
         self._cancelled_at = float("-inf")  # it was for earlier goals

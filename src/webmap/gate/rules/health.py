@@ -77,7 +77,7 @@ class LinkHealth:
         self.trips.clear()
 
     def closed(self) -> None:
-        """Note that the link is down."""
+        """Note that the socket to the bridge has closed."""
         self.up = False
 
     def answered(self, asked_at: float, now: float) -> None:
@@ -110,7 +110,7 @@ class DisplayPulse:
         self._beat_at = float("-inf")
 
     def beat(self, now: float) -> None:
-        """Note a heartbeat."""
+        """Note a heartbeat of the display, at ``now`` in seconds."""
         self._beat_at = now
 
     def fault(self, now: float) -> str | None:

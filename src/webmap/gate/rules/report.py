@@ -32,7 +32,7 @@ _DIGITS = 3
 
 
 def report(machine: Machine, spec: RobotSpec, now: float) -> RobotReport:
-    """Return the report on one robot at ``now``."""
+    """Return what pages and programs are shown of one robot at ``now``."""
     lease = machine.authority.lease
     speed = machine.speeds.own if lease is None else machine.speeds.speed
     age, test = machine.speeds.ages.p95, machine.tests.last

@@ -105,7 +105,6 @@ def _hits(group: Sequence[float], near: float) -> list[float]:
 
 
 def _known_count(group: Sequence[float], near: float) -> int:
-    """Return the number of known beams."""
     return sum([_is_known(r, near) for r in group])
 
 

@@ -135,7 +135,7 @@ class MachineSpeeds:
 
     @property
     def speed(self) -> Speed:
-        """The speeds in force now."""
+        """The lowest of all limits, in m/s and rad/s, less over a slow connection."""
         speed = speed_in_force([*self._caps(), self.page_cap])
         return governed(speed, self.ages.slow, self.stop_time)
 

@@ -75,7 +75,7 @@ class MachineTest:
 
     @property
     def running(self) -> bool:
-        """Whether the test is running."""
+        """Whether the robot creeps, or the time until it stops is being measured."""
         return self.state in ("creeping", "waiting")
 
     def on_written(self, twist: Twist) -> None:
@@ -164,7 +164,7 @@ class StopTests:
 
     @property
     def running(self) -> MachineTest | None:
-        """The running test."""
+        """The test that has not ended, if there is one."""
         return self.last if self.last is not None and self.last.running else None
 
     def begin(self, armed: bool, now: float) -> None:

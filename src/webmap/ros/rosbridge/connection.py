@@ -318,7 +318,7 @@ class Liveness:
         return self._pinged is not None
 
     def is_ping_due(self, now: float) -> bool:
-        """Return whether the next ping is due."""
+        """Return whether to ping now, which waits for the answer to the last ping."""
         if self._pinged is not None:
             return False
         return self._took >= self.SLOW or now - self._ponged >= self.PERIOD

@@ -191,4 +191,4 @@ class FrameReader:
 
 
 def ignore(_message: bytes | bytearray) -> None:
-    """Drop a message."""
+    """Drop a message, as long as nobody receives the messages."""

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 from webmap.base.errors import BridgeClosed, BridgeError, ProtocolError
 from webmap.base.identifiers import generate_id
 from webmap.base.text import one_line
-from webmap.ros.definitions import Definitions
 from webmap.ros.names import split_type
 from webmap.ros.received_message import BridgeStats, ReceivedMessage
 from webmap.ros.rosbridge import ops
@@ -163,20 +162,6 @@ class RosbridgeLink:
         """
         self.refuse_if_over()
         return await self._calls.call(service, args, type, timeout)
-
-    async def definitions(self, type: str, kind: str) -> Definitions:
-        """Return the definitions of a type and of all its parts, and the included ones.
-
-        Args:
-            type: The type.
-            kind: ``"msg"``, or ``"srv"`` for the request of a service.
-
-        Raises:
-            ServiceError: If rosapi may not be asked, or its answer is invalid.
-            BridgeClosed: If there is no connection.
-
-        """
-        return await self.graph.definitions(type, kind)
 
     def _send(self, frame: bytes) -> None:
         """Send a frame if connected; a new connection repeats it anyway."""

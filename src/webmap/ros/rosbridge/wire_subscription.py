@@ -175,7 +175,7 @@ class WireSubscription:
             self._ask(self._wire_options())
 
     def end(self) -> None:
-        """End the subscription."""
+        """Unsubscribe at the bridge, if this was subscribed there."""
         if self._asked is not None:
             self._send(ops.unsubscribe(self.topic.name, id=self._id))
         self._asked = None

@@ -119,7 +119,7 @@ class Transform(msgspec.Struct, frozen=True, gc=False):
 
     @property
     def inverse(self) -> "Transform":
-        """The inverse transform."""
+        """The transform back; after this one it changes nothing."""
         back = _conjugate(self.rotation)
         by = self.translation
         x, y, z = _turn(back, by.x, by.y, by.z)

@@ -33,7 +33,7 @@ class PageMessage(
     tag_field="op",
     forbid_unknown_fields=True,
 ):
-    """Base class of the messages of a page."""
+    """Base class of the messages of a page; a message with other fields is refused."""
 
 
 class PageHello(PageMessage, frozen=True, tag="hello"):

@@ -223,7 +223,7 @@ class CostmapTopics:
                 self._node.advertise(f"{topic}_updates", updates)
 
     def publish(self) -> None:
-        """Publish the costmaps that have subscribers."""
+        """Publish the costmaps that have subscribers, the global ones more rarely."""
         self._turn += 1
         for index, robot in enumerate(self._node.world.robots):
             local = self._topic(robot.topics, "local_costmap")

@@ -21,7 +21,7 @@ class Dialect:
 
     @property
     def is_ros2(self) -> bool:
-        """Whether this is the dialect of ROS 2."""
+        """Whether names of types, times and headers have the form of ROS 2."""
         return self.name == "ros2"
 
     def spell(self, canonical: str, kind: Kind = "msg") -> str:

@@ -157,7 +157,7 @@ class Graph:
             topic.latched[owner] = None
 
     def unsubscribe(self, owner: object, name: str) -> None:
-        """Remove the subscriber."""
+        """End a subscription; a topic without publishers and subscribers is removed."""
         topic = self.topics.get(resolve(name))
         if topic:
             topic.subscribers.pop(owner, None)
