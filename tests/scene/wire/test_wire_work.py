@@ -11,7 +11,7 @@ import tracemalloc
 import pytest
 
 from webmap.scene import live, svg
-from webmap.scene.node import Fragment
+from webmap.scene.node import Fragment, frame_request
 from webmap.scene.wire.opcodes import varint
 from webmap.scene.wire.session import SceneSession
 
@@ -104,14 +104,45 @@ def test_a_frame_for_one_more_viewer_takes_few_calls(clock):
         fleet.move()
     alone, together = calls_of(one.tick), calls_of(many.tick)
     more = (together - alone) / 10
-    assert alone <= 50 * ROBOTS
-    assert more <= 7 * ROBOTS
+    assert alone <= 38 * ROBOTS
+    assert more <= 5 * ROBOTS
+
+
+def test_a_frame_looks_only_at_what_changed_since_the_last_one(clock):
+    fleet = Fleet(clock, 1)
+    (page,) = fleet.sessions
+    frame_request.listen(lambda: None)
+    try:
+        for _ in range(2):  # the first one looks at everything
+            frame_request.begin()
+            fleet.tick()
+        looked_at = []
+
+        class Looked(dict):
+            def get(self, fragment):
+                looked_at.append(fragment)
+                return dict.get(self, fragment)
+
+        page._fragments = Looked(page._fragments)
+        moved = fleet.fragments[3]
+        moved.root.set_pose(1.0, 2.0, 3.0)
+        frame_request.begin()
+        fleet.tick()
+        assert looked_at == [moved]
+        moved.root.set_pose(2.0, 2.0, 3.0)  # a frame that the page missed
+        frame_request.begin()
+        frame_request.begin()
+        fleet.tick()
+        assert set(looked_at) == set(fleet.fragments)
+        assert len(fleet.sent) >= 2
+    finally:
+        frame_request.listen(None)
 
 
 def test_a_pose_takes_few_calls(clock):
     fleet = Fleet(clock, 1)
     calls = calls_of(fleet.move) / ROBOTS
-    assert calls <= 20
+    assert calls <= 16
 
 
 def fill_caches() -> None:
