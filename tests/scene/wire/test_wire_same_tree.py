@@ -2,10 +2,11 @@
 
 import base64
 import math
+from unittest.mock import ANY
 
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
-from wire_picture import f32, histories, play
+from wire_picture import f32, histories, line_of, play, texts_of
 
 from equipment.chromium import watched_tab
 from equipment.scene_host import SceneHost
@@ -38,7 +39,7 @@ async (frames) => {
     const attributes = Object.fromEntries(
       Array.from(node.attributes, ({ name, value }) => [name, value]),
     );
-    const { class: classes = "", style, d, transform, ...rest } = attributes;
+    const { class: classes = "", style, d, transform, points, ...rest } = attributes;
     delete rest["data-age"];
     const list = Array.from(node.transform?.baseVal ?? [], (t) => t.matrix);
     const m = list.reduce((all, one) => all.multiply(one), new DOMMatrix());
@@ -50,6 +51,8 @@ async (frames) => {
       size: node.style.getPropertyValue("--dot-size"),
       matrix: [m.a, m.b, m.c, m.d, m.e, m.f],
       dots: (d ?? "").split("M").length - 1,
+      line: Array.from(node.points ?? [], ({ x, y }) => [x, y]).flat(),
+      named: points !== undefined,
       children: Array.from(node.childNodes, plain),
     };
   };
@@ -79,11 +82,13 @@ def expected(node, mount=None):
     return {
         "tag": node.tag,
         "svg": node.namespace == "svg",
-        "attributes": dict(node._attributes),
+        "attributes": {k: v for k, v in texts_of(node).items() if k != "points"},
         "classes": sorted({*node.classes, *(mount.classes if mount else ())}),
         "size": node._styles.get("--dot-size", ""),
         "matrix": pytest.approx(matrix, rel=1e-5, abs=1e-5),
         "dots": len(node._dots.points) // 4 if node._dots else 0,
+        "line": line_of(node) or ([1, 2] if "points" in texts_of(node) else []),
+        "named": ANY if line_of(node) == [] else "points" in node._attributes,
         "children": [expected(child) for child in node.children],
     }
 
