@@ -195,9 +195,8 @@ export class Item {
    * @param {number[]} points The x and y of its last points, in metres.
    */
   setLine(total, points) {
-    const { element } = this;
-    if (!(element instanceof SVGPolylineElement || element instanceof SVGPolygonElement)) return;
-    const list = element.points;
+    const { points: list } = /** @type {SVGPolylineElement} */ (this.element);
+    if (!list) return;
     const kept = total - points.length / 2;
     if (kept === 0) list.clear();
     while (list.numberOfItems > kept) list.removeItem(0);
