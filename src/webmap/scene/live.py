@@ -29,9 +29,6 @@ SAME = 0.001
 """Seconds by which two times of measurement may differ and count as the same; pages
 get milliseconds."""
 
-MOST = 3.4e38
-"""A greater number does not fit into 32 bits."""
-
 
 class Dots(NamedTuple):
     """Points to draw as small squares."""
@@ -233,15 +230,14 @@ class Live(Parent):
         if self.tag not in ("polyline", "polygon"):
             raise SceneError(f"{self!r} is not a polyline or polygon, so it is no line")
         numbers = [number for x, y in points for number in (x, y)]
-        if not sum(map(abs, numbers)) < MOST:  # so that NaN is refused, too
+        if not sum(map(abs, numbers)) < 3.4e38:  # which refuses NaN, too
             raise SceneError("a line must be of finite numbers within 32 bits")
         return struct.pack(f"<{len(numbers)}f", *numbers)
 
     def _record(self, line: Line, added: int) -> None:
         self._touch("points")
         at = self.fragment
-        where = (0, 0) if at is None else (at.id, at.revision)
-        line.added.append((*where, added))
+        line.added.append((0, 0, added) if at is None else (at.id, at.revision, added))
 
     def set_dots(self, points: bytes | bytearray | memoryview, unit: float) -> None:
         """Draw the element, a ``path``, as a small square at each point.
