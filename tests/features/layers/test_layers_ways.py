@@ -2,11 +2,13 @@
 
 import itertools
 import math
+import sys
 
 import pytest
 from module_fakes import header, numbers, pose, to_root
 
-from webmap.base.geometry import Quaternion
+from webmap.base.geometry import Quaternion, Vector3
+from webmap.scene.wire.encode import encode_changes
 
 
 def path(points, frame="map", *, ros2=False) -> dict:
@@ -200,6 +202,26 @@ def test_the_lines_of_a_long_trail_join_without_a_gap(link, robot, monkeypatch):
     for one, next in itertools.pairwise(trail.points):
         assert one[-1] == next[0]
     assert drawn(trail) == [near(part) for part in trail.points]
+
+
+def test_a_pose_takes_as_few_calls_and_bytes_with_a_long_trail(link, robot):
+    calls, trail = 0, robot.add_module("Trail", length=30.0)
+
+    def count(frame, event, arg):
+        nonlocal calls
+        calls += event in ("call", "c_call")
+
+    for i in range(400):
+        go(link, 0.1 * i, 0)
+    fragment = robot.svg.fragment
+    since = fragment.revision
+    robot.position = Vector3(40.0, 0.0, 0.0)
+    sys.setprofile(count)
+    trail.on_odometry_update()
+    sys.setprofile(None)
+    assert calls <= 45
+    assert len(trail.points[0]) > 290
+    assert len(encode_changes(fragment, since)) <= 22
 
 
 def test_a_trail_that_is_shorter_than_a_step_is_one_step(link, robot):
