@@ -119,6 +119,20 @@ def test_dots_keep_a_transform_set_as_text(blank):
         assert_same(blank, [([add, dots], then), ([transform], then)])
 
 
+def test_a_line_of_numbers_and_a_text_of_points_replace_each_other(blank):
+    def step(name, number):
+        return (name, 0, 4, 0, number, "")
+
+    line, longer, shorter = step("line", 3.0), step("extend", 6.5), step("extend", 2.5)
+    text, unset = step("points", 1.0), step("points", -1.0)
+    steps = [line, longer, shorter, text, longer, unset, longer, shorter, unset, line]
+    history = [([("add", 0, 0, 0, 0.0, ""), line], "frame")]
+    for each in steps:
+        history.append(([each], "frame"))
+        assert_same(blank, history)
+        assert_same(blank, [*history[:-1], ([each, longer], "look away")])
+
+
 def assert_same(blank, history):
     session = SceneSession()
     frames = [base64.b64encode(f).decode() for f in play(history, session)]
