@@ -126,6 +126,9 @@ async ({ hidden, closed, absent, unordered, level, unstable }) => {
       } else if (name === "href" || name === "src") {
         const own = value.startsWith("#") ? `#${numbered(value.slice(1))}` : "";
         found.push(`${name}=${own || shown(element)}`);
+      } else if (name === "points" && value) {
+        // As in a text of Python; the browser writes a list of points without commas.
+        found.push(`points=${digest(Array.from(element.points, ({ x, y }) => `${x},${y}`).join(" "))}`);
       } else if (NUMBERED.test(name)) {
         found.push(`${name}=${value.split(" ").map(numbered).join(" ")}`);
       } else {

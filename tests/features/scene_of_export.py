@@ -25,6 +25,7 @@ robot.svg.append(
     svg.text(text="Böb <&>", class_="turned"),
     svg.circle(r=0.05, class_="grown"),
     svg.circle(r=9, class_="gone"),
+    svg.polyline(fill="none").set_line([(12345.678, -1.25), (5_000_000.5, 0.1)]),
 )
 
 

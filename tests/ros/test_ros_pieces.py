@@ -132,6 +132,29 @@ def test_a_turn_asks_for_processor_time_only_when_it_may_be_over(monkeypatch):
     assert turn.is_over
 
 
+@pytest.mark.parametrize(("links", "times"), [(1, 1), (3, 3)])
+def test_a_step_asks_for_processor_time_once_for_each_link(monkeypatch, links, times):
+    asked = []
+
+    class Brief:
+        def take(self, turn):
+            assert not any(turn.is_over for _ in range(100))
+
+    def thread_time():
+        asked.append(True)
+        return 5.0
+
+    async def story():
+        monkeypatch.setattr("webmap.ros.rosbridge.turns.time.thread_time", thread_time)
+        for _ in range(links):
+            turns().ask(Brief())
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+
+    asyncio.run(story())
+    assert len(asked) == times
+
+
 @pytest.mark.parametrize("longest", [0.001, 0.5])
 def test_the_rest_after_a_step_is_as_long_as_the_step_but_at_most_the_longest(longest):
     async def story():

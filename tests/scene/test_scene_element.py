@@ -123,6 +123,32 @@ def test_dots_need_a_path_whole_points_and_a_unit():
         svg.path().set_dots(b"", 0)
 
 
+@pytest.mark.parametrize("number", [math.nan, math.inf, 1e39])
+def test_a_line_must_be_of_finite_numbers_and_stays_as_it_was(number):
+    line = svg.polyline().set_line([(0, 0), (1.234, -2)])
+    with pytest.raises(SceneError, match="finite"):
+        line.set_line([(5, 6), (7, number)])
+    with pytest.raises(SceneError, match="finite"):
+        line.extend_line([(number, 6)], drop=1)
+    with pytest.raises(SceneError, match="drop"):
+        line.extend_line([], drop=-1)
+    assert line.get("points") == line.attributes["points"] == "0,0 1.234,-2"
+
+
+def test_only_a_polyline_or_polygon_can_be_a_line():
+    svg.polygon().set_line([(0, 0)])
+    for other in (svg.path(), html.p()):
+        with pytest.raises(SceneError, match="not a polyline"):
+            other.set_line([(0, 0)])
+
+
+def test_a_line_that_stays_the_same_is_not_sent_again():
+    line = svg.polyline().set_line([(0, 0), (1.234, -2)])
+    fragment = Fragment(line)
+    line.set_line([(0, 0), (1.234, -2)]).extend_line([])
+    assert fragment.revision == 0
+
+
 @pytest.mark.parametrize("age", [-1, math.nan])
 def test_an_age_and_its_limit_must_not_be_negative_or_nan(age):
     with pytest.raises(SceneError, match="age"):

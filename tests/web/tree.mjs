@@ -132,6 +132,7 @@ export class Tree {
   attribute(id, name, value) {
     if (name === "transform") this._set(id, { transform: value ?? undefined });
     else this._setIn(id, "attributes", name, value === "" ? "(empty)" : value);
+    if (name === "points") this._set(id, { line: undefined });
   }
 
   classes(id, classes) {
@@ -152,6 +153,16 @@ export class Tree {
 
   dots(id, unit, points) {
     this._set(id, { dots: { unit, points: Array.from(points) } });
+  }
+
+  line(id, total, points) {
+    this._setIn(id, "attributes", "points", null);
+    for (const { nodes } of this.targets) {
+      const node = nodes.get(id);
+      const line = [...(node.line ?? []), ...points];
+      if (line.length < 2 * total) throw new Error(`${id} lacks points`);
+      node.line = line.slice(line.length - 2 * total);
+    }
   }
 
   age(id, measured) {

@@ -16,7 +16,7 @@ from webmap.scene.allowed import (
     check_value,
     format_value,
 )
-from webmap.scene.live import Live, MapPlace
+from webmap.scene.live import Line, Live, MapPlace
 from webmap.scene.node import Child
 
 Handler = Callable[["Event"], Any]
@@ -220,7 +220,7 @@ class Element(Live):
     def _prepare(self, tag: str, namespace: str) -> None:
         self.tag = tag
         self.namespace = namespace
-        self._attributes: dict[str, str] = {}
+        self._attributes: dict[str, str | Line] = {}
         self._classes: dict[str, None] = {}
         self._listeners: dict[str, list[Listener]] = {}
         self._styles: dict[str, str] = {}
@@ -244,7 +244,8 @@ class Element(Live):
             return str(self.classes) or None
         if name == "transform":
             return self._transform if isinstance(self._transform, str) else None
-        return self._attributes.get(name)
+        value = self._attributes.get(name)
+        return value if value is None else str(value)
 
     def set(
         self, name: str | None = None, value: Any = None, /, **attributes: Any
@@ -295,7 +296,7 @@ class Element(Live):
             self._store(self._styles, name, text)
         return self
 
-    def _store(self, place: dict[str, str], name: str, text: str | None) -> None:
+    def _store(self, place: dict[str, Any], name: str, text: str | None) -> None:
         if text is None:
             place.pop(name, None)
         else:

@@ -1,14 +1,17 @@
-"""Values that change many times a second: poses, dots, rays and ages."""
+"""Values that change many times a second: poses, lines, dots, rays and ages."""
 
 import math
+import struct
 import time
-from typing import Any, NamedTuple
+from collections import deque
+from collections.abc import Iterable
+from typing import Any, NamedTuple, Self
 
 import msgspec
 
 from webmap.base.errors import SceneError
 from webmap.base.geometry import Affine
-from webmap.scene.node import Parent
+from webmap.scene.node import Fragment, Parent
 
 isfinite = math.isfinite
 
@@ -87,11 +90,44 @@ class MapPlace(NamedTuple):
     """Pixels, or 0 for the height of its container."""
 
 
+class Line:
+    """The points of a line; a page gets only those that it does not have yet."""
+
+    __slots__ = ("added", "points")
+
+    KNOWN = 32
+    """Most changes that are known one by one: a page that is later gets all points."""
+
+    def __init__(self, points: bytes) -> None:
+        self.points = bytearray(points)
+        """Pairs of 32-bit floats, little-endian: x and y."""
+        self.added: deque[tuple[int, int, int]] = deque(maxlen=self.KNOWN)
+        """The fragment of each change, its revision then, and how many points came."""
+
+    def __len__(self) -> int:
+        return len(self.points) // 8
+
+    def __str__(self) -> str:
+        pairs = struct.iter_unpack("<ff", self.points)
+        return " ".join(f"{x:.7g},{y:.7g}" for x, y in pairs)
+
+    def new_since(self, fragment: Fragment, revision: int) -> int:
+        """Return how many of the last points a page lacks that has a revision."""
+        new = 0
+        for changed_in, when, added in reversed(self.added):
+            # A page got the points of an earlier place together with the element.
+            if changed_in != fragment.id or when <= revision:
+                return min(new, len(self))
+            new += added
+        return len(self)
+
+
 class Live(Parent):
-    """A node whose pose, dots and age can be set cheaply at every tick."""
+    """A node whose pose, line, dots and age can be set cheaply at every tick."""
 
     __slots__ = ("_age", "_coded", "_dots", "_map", "_reach", "_transform")
 
+    _attributes: dict[str, str | Line]
     namespace = "svg"
 
     def __init__(self) -> None:
@@ -148,6 +184,60 @@ class Live(Parent):
             raise SceneError(f"{self!r} is not SVG, so it has no pose")
         self._transform = transform
         self._touch("transform")
+
+    def set_line(self, points: Iterable[tuple[float, float]]) -> Self:
+        """Draw the element, a ``polyline`` or a ``polygon``, through points.
+
+        They are sent as 32-bit floats: faster and shorter than text, and as exact as
+        browsers draw. ``get("points")`` returns them as text, with seven digits.
+
+        Raises:
+            SceneError: If the element is no polyline or polygon, or a number is not
+                finite or too large for 32 bits.
+
+        """
+        line, before = Line(self._packed(points)), self._attributes.get("points")
+        if not isinstance(before, Line) or before.points != line.points:
+            self._attributes["points"] = line
+            self._record(line, len(line))
+        return self
+
+    def extend_line(
+        self, points: Iterable[tuple[float, float]], *, drop: int = 0
+    ) -> Self:
+        """Add points to a line or begin one; a page gets only the new points.
+
+        Args:
+            points: x and y of each point.
+            drop: How many points are removed from the beginning of the line before.
+
+        Raises:
+            SceneError: If ``drop`` is below 0, and in the cases of :meth:`set_line`.
+
+        """
+        line, data = self._attributes.get("points"), self._packed(points)
+        if drop < 0:
+            raise SceneError(f"drop must be at least 0, got {drop}")
+        if data or drop:
+            if not isinstance(line, Line):
+                line = self._attributes["points"] = Line(b"")
+            del line.points[: 8 * drop]
+            line.points += data
+            self._record(line, len(data) // 8)
+        return self
+
+    def _packed(self, points: Iterable[tuple[float, float]]) -> bytes:
+        if self.tag not in ("polyline", "polygon"):
+            raise SceneError(f"{self!r} is not a polyline or polygon, so it is no line")
+        numbers = [number for x, y in points for number in (x, y)]
+        if not sum(map(abs, numbers)) < 3.4e38:  # which refuses NaN, too
+            raise SceneError("a line must be of finite numbers within 32 bits")
+        return struct.pack(f"<{len(numbers)}f", *numbers)
+
+    def _record(self, line: Line, added: int) -> None:
+        self._touch("points")
+        at = self.fragment
+        line.added.append((0, 0, added) if at is None else (at.id, at.revision, added))
 
     def set_dots(self, points: bytes | bytearray | memoryview, unit: float) -> None:
         """Draw the element, a ``path``, as a small square at each point.

@@ -67,8 +67,11 @@ export class Item {
     const { element } = this;
     if (name === "transform") this._setTransform(value);
     else if (name === "href" || name === "src") this._setAddress(name, value);
-    else if (value === null) element.removeAttribute(name);
-    else element.setAttribute(name, value);
+    else if (value !== null) element.setAttribute(name, value);
+    else {
+      if (name === "points") this.setLine(0, []);
+      element.removeAttribute(name);
+    }
     if (PROPERTIES.has(name) && name in element) {
       const property = BOOLEANS.has(name) ? value !== null : (value ?? "");
       Object.assign(element, { [name]: property });
@@ -182,6 +185,26 @@ export class Item {
     if (value === null) element.removeAttribute("transform");
     else element.setAttribute("transform", value);
     this._scaleDots();
+  }
+
+  /**
+   * Add points to a line and drop the first ones. The browser's own list is changed, so
+   * no number becomes text, and a long line takes no longer than a short one.
+   *
+   * @param {number} total Points that the line has then.
+   * @param {number[]} points The x and y of its last points, in metres.
+   */
+  setLine(total, points) {
+    const { points: list } = /** @type {SVGPolylineElement} */ (this.element);
+    if (!list) return;
+    const kept = total - points.length / 2;
+    if (kept === 0) list.clear();
+    while (list.numberOfItems > kept) list.removeItem(0);
+    for (let i = 0; i < points.length; i += 2) {
+      const point = maker.createSVGPoint();
+      [point.x, point.y] = [points[i], points[i + 1]];
+      list.appendItem(point);
+    }
   }
 
   /**

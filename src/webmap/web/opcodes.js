@@ -1,7 +1,7 @@
 // Made by tools/make_javascript.py from webmap/scene/wire/opcodes.py: do not edit.
 
 /** Changes with the tables, so that a page of another version notices. */
-export const VERSION = 17568;
+export const VERSION = 28744;
 
 /** The first byte of each record. */
 export const OP = Object.freeze({
@@ -41,6 +41,7 @@ export const OP = Object.freeze({
   EMPTY: 51,
   MAP: 52,
   RAYS: 53,
+  LINE: 54,
 });
 
 /** Flags of a frame and of an event that is listened to. */

@@ -523,6 +523,16 @@ export class Scene {
 
   /**
    * @param {number} id
+   * @param {number} total
+   * @param {number[]} points
+   */
+  line(id, total, points) {
+    this._each(id, (item) => item.setLine(total, points));
+    this._redraw();
+  }
+
+  /**
+   * @param {number} id
    * @param {number | null} measured
    */
   age(id, measured) {

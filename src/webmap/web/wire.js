@@ -44,6 +44,7 @@ import { rays } from "./rays.js";
  * @property {(id: number, x: number, y: number, yaw: number) => void} pose
  * @property {(id: number, matrix: Matrix) => void} matrix
  * @property {(id: number, unit: number, points: Int16Array) => void} dots
+ * @property {(id: number, total: number, points: number[]) => void} line
  * @property {(id: number, measured: number | null) => void} age
  * @property {(id: number, limit: number, shown: boolean) => void} ageLimit
  * @property {(id: number, data: string) => void} data
@@ -279,6 +280,7 @@ const RECORDS = {
   [OP.MATRIX]: (r, sink) => sink.matrix(r.varint(), r.matrix()),
   [OP.DOTS]: (r, sink) => sink.dots(r.varint(), r.f32(), r.i16s(2 * r.varint())),
   [OP.RAYS]: (r, sink) => sink.dots(r.varint(), ...rays(r)),
+  [OP.LINE]: (r, sink) => sink.line(r.varint(), r.varint(), r.f32s(2 * r.varint())),
   [OP.AGE]: (r, sink) => sink.age(r.varint(), r.varint() || null),
   [OP.AGE_LIMIT]: (r, sink) => sink.ageLimit(r.varint(), r.f32(), r.u8() > 0),
   [OP.DATA]: (r, sink) => sink.data(r.varint(), r.string()),

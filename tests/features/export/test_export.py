@@ -145,6 +145,12 @@ def test_the_exported_svg_has_no_external_references_and_no_scripts(tab, tmp_pat
         assert words.text is None or float(words.get("textLength", 0)) > 0, words.text
 
 
+def test_an_exported_line_has_all_digits_of_its_numbers(tab, tmp_path):
+    root = ElementTree.parse(saved(tab, "svg", tmp_path))
+    lines = [line.get("points") for line in root.iter(f"{SVG}polyline")]
+    assert "12345.678,-1.25 5000000.5,0.1" in lines
+
+
 def test_exported_texts_have_the_same_width_in_another_font(tab, chromium, tmp_path):
     file = saved(tab, "svg", tmp_path)
     text = file.read_text("utf-8")

@@ -2,11 +2,13 @@
 
 import itertools
 import math
+import sys
 
 import pytest
 from module_fakes import header, numbers, pose, to_root
 
-from webmap.base.geometry import Quaternion
+from webmap.base.geometry import Quaternion, Vector3
+from webmap.scene.wire.encode import encode_changes
 
 
 def path(points, frame="map", *, ros2=False) -> dict:
@@ -163,27 +165,71 @@ def test_a_robot_that_only_jumps_has_no_trail_line(link, robot):
     assert len(trail.svg.children) == 0
 
 
-def test_a_trail_is_limited_in_length_and_its_old_pieces_are_unchanged(link, robot):
+def drawn(trail):
+    return [in_world(line) for line in trail.svg.children]
+
+
+def test_a_trail_is_limited_in_length(link, robot):
     trail = robot.add_module("Trail", length=10.0, step=0.09)
     for i in range(1000):
         go(link, 0.1 * i, 0)
-    points = [point for piece in trail.points for point in piece]
+    ((*points,),) = trail.points
     assert 9.8 <= points[-1][0] - points[0][0] <= 10.2
-    middle = trail.svg.children[1]
-    before = middle.get("points")
-    go(link, 100.0, 0)
-    assert middle.get("points") == before
-    assert len(trail.svg.children) <= 4
+    assert drawn(trail) == [near(points)]
 
 
-def test_pieces_of_a_trail_join_without_a_gap(link, robot):
-    trail = robot.add_module("Trail", step=0.09)
-    for i in range(120):
+def test_the_parts_of_a_trail_before_a_jump_are_shortened_and_removed(link, robot):
+    trail = robot.add_module("Trail", length=1.0)
+    for x in (0, 0.5, 1.0, 9.0, 9.5):
+        go(link, x, 0)
+    assert trail.points == [[(0.5, 0), (1.0, 0)], [(9.0, 0), (9.5, 0)]]
+    assert drawn(trail) == [near(part) for part in trail.points]
+    go(link, 10.4, 0)
+    assert trail.points == [[(9.0, 0), (9.5, 0), (10.4, 0)]]
+    assert drawn(trail) == [near(part) for part in trail.points]
+    for x in (11.3, 19.0, 19.9, 20.8):
+        go(link, x, 0)
+    assert trail.points == [[(19.0, 0), (19.9, 0), (20.8, 0)]]
+    assert drawn(trail) == [near(part) for part in trail.points]
+
+
+def test_the_lines_of_a_long_trail_join_without_a_gap(link, robot, monkeypatch):
+    monkeypatch.setattr("webmap.features.layers.trail.PART", 20)
+    trail = robot.add_module("Trail", length=5.0, step=0.09)
+    for i in range(200):
         go(link, 0.1 * i, 0)
-    pieces = trail.points
-    assert len(pieces) == 3
-    for one, next in itertools.pairwise(pieces):
+    assert [len(part) for part in trail.points[1:]] == [21, 20]
+    for one, next in itertools.pairwise(trail.points):
         assert one[-1] == next[0]
+    assert drawn(trail) == [near(part) for part in trail.points]
+
+
+def test_a_pose_takes_as_few_calls_and_bytes_with_a_long_trail(link, robot):
+    calls, trail = 0, robot.add_module("Trail", length=30.0)
+
+    def count(frame, event, arg):
+        nonlocal calls
+        calls += event in ("call", "c_call")
+
+    for i in range(400):
+        go(link, 0.1 * i, 0)
+    fragment = robot.svg.fragment
+    since = fragment.revision
+    robot.position = Vector3(40.0, 0.0, 0.0)
+    sys.setprofile(count)
+    trail.on_odometry_update()
+    sys.setprofile(None)
+    assert calls <= 30
+    assert len(trail.points[0]) > 290
+    assert len(encode_changes(fragment, since)) <= 22
+
+
+def test_a_trail_that_is_shorter_than_a_step_is_one_step(link, robot):
+    trail = robot.add_module("Trail", length=0.1)
+    for x in (0, 0.5, 1.0):
+        go(link, x, 0)
+    assert trail.points == [[(0.5, 0), (1.0, 0)]]
+    assert drawn(trail) == [near(part) for part in trail.points]
 
 
 def test_a_trail_can_be_cleared(link, robot):

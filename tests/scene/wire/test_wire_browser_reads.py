@@ -8,15 +8,17 @@ import secrets
 import shutil
 import subprocess
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from wire_picture import histories, picture_of, play
 
 from webmap.base.geometry import Affine
 from webmap.scene import html, node, svg
 from webmap.scene.document import Document
+from webmap.scene.live import Line
 from webmap.scene.node import Fragment
 from webmap.scene.wire.session import SceneSession
 
@@ -69,6 +71,62 @@ def test_the_browser_decoder_builds_the_same_tree_for_any_scene_history(
     assert answer["picture"] == json.loads(json.dumps(picture_of(session)))
 
 
+ADD = ("extend", 1, 0)
+line_steps = st.lists(
+    st.one_of(
+        st.tuples(st.just("set"), st.integers(0, 4)),
+        st.tuples(st.just("extend"), st.integers(0, 40), st.integers(0, 4)),
+        st.tuples(st.sampled_from(["text", "unset", "take out", "one", "other"])),
+        st.tuples(st.just("page"), st.integers(0, 1)),
+    ),
+    max_size=25,
+)
+
+
+@patch.object(Line, "KNOWN", 3)
+@given(steps=line_steps)
+@example(steps=[ADD, ("other",), ("one",), ADD, ("other",), ("page", 0), ADD])
+@settings(max_examples=200)
+def test_every_page_has_the_points_of_a_line_after_any_steps(decoder, steps):
+    """The line moves between two fragments; the pages are late by a number of steps."""
+    line, places, count = svg.polyline(), [svg.g(), svg.g()], itertools.count()
+    fragments = [Fragment(place) for place in places]
+    pages = [(SceneSession(), []), (SceneSession(), [])]
+    for session, _ in pages:
+        for fragment in fragments:
+            session.mount(fragment, under=0)
+
+    def look(session, frames):
+        frame = session.frame(0.0)
+        if frame is not None:
+            frames.append(frame)
+            session.receive(f'{{"op":"seen","frame":{session._frame}}}')
+
+    def points(number):
+        return [(next(count), 0.25) for _ in range(number)]
+
+    places[0].append(line)
+    for name, *numbers in [*steps, ("page", 0), ("page", 1)]:
+        match name:
+            case "set":
+                line.set_line(points(*numbers))
+            case "extend":
+                line.extend_line(points(numbers[0]), drop=numbers[1])
+            case "text":
+                line.set(points=points(2))
+            case "unset":
+                line.unset("points")
+            case "take out":
+                line.remove()
+            case "page":
+                look(*pages[numbers[0]])
+            case _:
+                places[name == "other"].append(line)
+    for session, frames in pages:
+        answer = decoder.read(frames)
+        assert answer.get("picture") == json.loads(json.dumps(picture_of(session)))
+
+
 @given(st.binary(max_size=200), st.booleans())
 def test_the_browser_decoder_reads_any_bytes_or_raises_a_known_error(
     decoder, data, with_header
@@ -95,7 +153,8 @@ def everything_about_elements():
     )
     dots = svg.path(class_="dot").set_style("--dot-size", 0.05)
     dots.set_dots(b"\x01\x00\xff\xff\xe8\x03\x18\xfc", 0.001)
-    root.append(dots, svg.g(transform="scale(2)"))
+    line = svg.polyline().set_line([(1.5, -2), (3, 4)]).extend_line([(5, 6)], drop=1)
+    root.append(dots, svg.g(transform="scale(2)"), line)
     root.set_pose(1.5, -2.25, 0.5)
     root.on("click", print, prevent=True, stop=True)
     root.children[3].set_matrix(Affine(1, 2, 3, 4, 5.5, 6))

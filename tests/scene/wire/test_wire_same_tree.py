@@ -2,10 +2,11 @@
 
 import base64
 import math
+from unittest.mock import ANY
 
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
-from wire_picture import f32, histories, play
+from wire_picture import f32, histories, line_of, play, texts_of
 
 from equipment.chromium import watched_tab
 from equipment.scene_host import SceneHost
@@ -38,7 +39,7 @@ async (frames) => {
     const attributes = Object.fromEntries(
       Array.from(node.attributes, ({ name, value }) => [name, value]),
     );
-    const { class: classes = "", style, d, transform, ...rest } = attributes;
+    const { class: classes = "", style, d, transform, points, ...rest } = attributes;
     delete rest["data-age"];
     const list = Array.from(node.transform?.baseVal ?? [], (t) => t.matrix);
     const m = list.reduce((all, one) => all.multiply(one), new DOMMatrix());
@@ -50,6 +51,8 @@ async (frames) => {
       size: node.style.getPropertyValue("--dot-size"),
       matrix: [m.a, m.b, m.c, m.d, m.e, m.f],
       dots: (d ?? "").split("M").length - 1,
+      line: Array.from(node.points ?? [], ({ x, y }) => [x, y]).flat(),
+      named: points !== undefined,
       children: Array.from(node.childNodes, plain),
     };
   };
@@ -79,11 +82,13 @@ def expected(node, mount=None):
     return {
         "tag": node.tag,
         "svg": node.namespace == "svg",
-        "attributes": dict(node._attributes),
+        "attributes": {k: v for k, v in texts_of(node).items() if k != "points"},
         "classes": sorted({*node.classes, *(mount.classes if mount else ())}),
         "size": node._styles.get("--dot-size", ""),
         "matrix": pytest.approx(matrix, rel=1e-5, abs=1e-5),
         "dots": len(node._dots.points) // 4 if node._dots else 0,
+        "line": line_of(node) or ([1, 2] if "points" in texts_of(node) else []),
+        "named": ANY if line_of(node) == [] else "points" in node._attributes,
         "children": [expected(child) for child in node.children],
     }
 
@@ -112,6 +117,20 @@ def test_dots_keep_a_transform_set_as_text(blank):
     for then in ("frame", "look away"):
         assert_same(blank, [([add, transform], then), ([dots], then)])
         assert_same(blank, [([add, dots], then), ([transform], then)])
+
+
+def test_a_line_of_numbers_and_a_text_of_points_replace_each_other(blank):
+    def step(name, number):
+        return (name, 0, 4, 0, number, "")
+
+    line, longer, shorter = step("line", 3.0), step("extend", 6.5), step("extend", 2.5)
+    text, unset = step("points", 1.0), step("points", -1.0)
+    steps = [line, longer, shorter, text, longer, unset, longer, shorter, unset, line]
+    history = [([("add", 0, 0, 0, 0.0, ""), line], "frame")]
+    for each in steps:
+        history.append(([each], "frame"))
+        assert_same(blank, history)
+        assert_same(blank, [*history[:-1], ([each, longer], "look away")])
 
 
 def assert_same(blank, history):

@@ -12,7 +12,8 @@ import pytest
 
 from webmap.scene import live, svg
 from webmap.scene.node import Fragment, frame_request
-from webmap.scene.wire.opcodes import varint
+from webmap.scene.wire.encode import encode_changes
+from webmap.scene.wire.opcodes import Op, varint
 from webmap.scene.wire.session import SceneSession
 
 TICK = 0.05
@@ -143,6 +144,21 @@ def test_a_pose_takes_few_calls(clock):
     fleet = Fleet(clock, 1)
     calls = calls_of(fleet.move) / ROBOTS
     assert calls <= 16
+
+
+def test_a_point_of_a_line_of_any_length_takes_few_calls_and_bytes(clock):
+    for points in (2, 20_000):
+        line = svg.polyline().set_line([(x, 0.5) for x in range(points)])
+        fragment = Fragment(svg.g(line))
+        session = SceneSession()
+        session.mount(fragment, under=0)
+        session.frame(clock.now)
+        session.receive('{"op":"seen","frame":1}')
+        assert calls_of(line.extend_line, [(1.0, 2.0)]) <= 16
+        assert calls_of(encode_changes, fragment, fragment.revision - 1) <= 45
+        head = 15 + len(bytes([Op.DELTA]) + varint(fragment.id))
+        bytes_of_point = len(session.frame(clock.now)) - head
+        assert bytes_of_point <= 13 + len(varint(line.id))
 
 
 def fill_caches() -> None:

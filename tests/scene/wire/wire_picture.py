@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from webmap.base.geometry import Affine
 from webmap.scene import html, svg
 from webmap.scene.document import BoundElement
+from webmap.scene.live import Line
 from webmap.scene.node import Fragment, Text
 from webmap.scene.wire.page_state import flags
 
@@ -48,9 +49,23 @@ def node_picture(node):
     return picture
 
 
+def texts_of(node):
+    """Return the attributes that are sent as text."""
+    values = node._attributes.items()
+    return {name: value for name, value in values if isinstance(value, str)}
+
+
+def line_of(node):
+    """Return the numbers of a line, or None if the element has none."""
+    line = node._attributes.get("points")
+    if not isinstance(line, Line):
+        return None
+    return list(struct.unpack(f"<{2 * len(line)}f", line.points))
+
+
 def _values(node):
     values = {
-        "attributes": {k: v or "(empty)" for k, v in node._attributes.items()},
+        "attributes": {k: v or "(empty)" for k, v in texts_of(node).items()},
         "class": str(node.classes),
         "styles": node._styles,
         "transform": _transform(node._transform),
@@ -60,6 +75,8 @@ def _values(node):
         },
     }
     values = {name: value for name, value in values.items() if value}
+    if (line := line_of(node)) is not None:
+        values["line"] = line
     if node._dots is not None:
         points = struct.unpack(f"<{len(node._dots.points) // 2}h", node._dots.points)
         values["dots"] = {"unit": f32(node._dots.unit), "points": list(points)}
@@ -102,7 +119,7 @@ class Playground:
 
     def add(self, fragment, one, other, number, text):
         if fragment.root.namespace == "svg":
-            child = svg.g(svg.path(class_="dot"), svg.title(text))
+            child = svg.g(svg.path(class_="dot"), svg.title(text), svg.polyline())
         else:
             child = html.p(text, html.strong("x"))
         one.insert(int(number) % (len(one.children) + 1), child)
@@ -146,6 +163,18 @@ class Playground:
         if one.tag == "path":
             count = int(number) % 4
             one.set_dots(struct.pack(f"<{2 * count}h", *range(-count, count)), 0.001)
+
+    def line(self, fragment, one, other, number, text):
+        if one.tag == "polyline":
+            one.set_line([(number, i) for i in range(int(number) % 4)])
+
+    def extend(self, fragment, one, other, number, text):
+        if one.tag == "polyline":
+            one.extend_line([(number, 1.0)], drop=int(number) % 3)
+
+    def points(self, fragment, one, other, number, text):
+        if one.tag == "polyline":
+            one.set(points=[(1, 2)] if number > 0 else None)
 
     def age(self, fragment, one, other, number, text):
         one.set_age(abs(number), limit=abs(number), age_text=False)

@@ -14,11 +14,14 @@ const ATTRIBUTES = new Set(
   (
     "clipPathUnits cx cy d dx dy fx fy gradientTransform gradientUnits height id " +
     "lengthAdjust markerHeight markerUnits markerWidth maskContentUnits maskUnits offset " +
-    "orient pathLength patternContentUnits patternTransform patternUnits points " +
+    "orient pathLength patternContentUnits patternTransform patternUnits " +
     "preserveAspectRatio r refX refY rotate rx ry spreadMethod startOffset textLength " +
     "transform viewBox width x x1 x2 y y1 y2 data-name"
   ).split(" "),
 );
+
+/** @param {DOMPoint} point Its numbers are 32-bit floats, which have eight digits. */
+const pairOf = ({ x, y }) => [x, y].map((n) => Number(n.toPrecision(8))).join();
 
 /** Copies the visible map into a self-contained document. */
 export class Copier {
@@ -49,6 +52,9 @@ export class Copier {
     for (const { name, value } of original.attributes) {
       if (ATTRIBUTES.has(name)) copy.setAttribute(name, value);
     }
+    // The attribute has only six digits of the points of a line.
+    const { points } = /** @type {SVGPolylineElement} */ (original);
+    if (points) copy.setAttribute("points", Array.from(points, pairOf).join(" "));
     const here = writeStyle(copy, style, above);
     // An element that is only referred to has no position, and so no transform in
     // pixels.

@@ -241,7 +241,7 @@ def _arrow(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
     corners = [(0, shaft), (neck, shaft), (neck, wide), (seen, 0)]
     corners += [(neck, -wide), (neck, -shaft), (0, -shaft)]
     outline = [turn.apply(along, side / 2) for along, side in corners]
-    return (svg.polygon(points=_rounded(outline), **area_style(marker.color)),)
+    return (svg.polygon(**area_style(marker.color)).set_line(_rounded(outline)),)
 
 
 def _cube(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
@@ -250,7 +250,7 @@ def _cube(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
     if tilt.upright:
         return (svg.rect(x=-x / 2, y=-y / 2, width=x, height=y, **style),)
     outline = box((x, y, z), tilt)
-    return (svg.polygon(points=_rounded(outline), **style),)
+    return (svg.polygon(**style).set_line(_rounded(outline)),)
 
 
 def _sphere(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
@@ -270,16 +270,15 @@ def _cylinder(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
     if tilt.upright:
         return (svg.ellipse(rx=x / 2, ry=y / 2, **style),)
     outline = cylinder((x, y, z), tilt)
-    return (svg.polygon(points=_rounded(outline), **style),)
+    return (svg.polygon(**style).set_line(_rounded(outline)),)
 
 
 def _line_strip(marker: MarkerMsg, tilt: Transform) -> Iterable[Element]:
     (width,) = sizes(marker, "x")
     points = _points(marker, tilt)
     if not marker.colors:
-        yield svg.polyline(
-            points=_rounded(points), fill="none", **line_style(marker.color, width)
-        )
+        style = line_style(marker.color, width)
+        yield svg.polyline(fill="none", **style).set_line(_rounded(points))
         return
     parts = (
         (_line(one, other), colour)

@@ -119,5 +119,4 @@ class Path(RobotLayer):
 
     def draw(self, found: list[Vector3], at: Transform) -> None:
         """Draw the line as seen from above."""
-        line = flat(found, at)
-        self.line.set(points=[(rounded(x), rounded(y)) for x, y in line])
+        self.line.set_line([(rounded(x), rounded(y)) for x, y in flat(found, at)])

@@ -108,5 +108,4 @@ class Polygon(RobotLayer):
     def draw(self, found: list[Vector3], at: Transform) -> None:
         """Draw the outline as seen from above."""
         self.points = [(point.x, point.y) for point in found]
-        corners = flat(found, at)
-        self.outline.set(points=[(rounded(x), rounded(y)) for x, y in corners])
+        self.outline.set_line([(rounded(x), rounded(y)) for x, y in flat(found, at)])

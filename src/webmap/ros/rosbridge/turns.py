@@ -17,7 +17,7 @@ STEP = 0.002
 """Seconds of processor time for all connections together, before the rest runs."""
 
 SHARE = 0.0005
-"""Seconds of processor time for one connection at a time."""
+"""Seconds of processor time for one connection at a time, if others wait, too."""
 
 
 class Turn:
@@ -88,13 +88,14 @@ class Turns:
         begun = at = time.thread_time()
         loop = asyncio.get_running_loop()
         while self._queue and at < begun + STEP:
-            taker = self._queue.popleft()
-            wait = taker.take(Turn(at, min(SHARE, begun + STEP - at)))
+            taker, left = self._queue.popleft(), begun + STEP - at
+            wait = taker.take(Turn(at, min(SHARE, left) if self._queue else left))
             if wait == 0:
                 self._queue.append(taker)
             elif wait is not None:
                 loop.call_later(wait, self.ask, taker)
-            at = time.thread_time()
+            if self._queue:
+                at = time.thread_time()
         self._stepping = bool(self._queue)
         if self._stepping:
             rest = max(STEP, at - begun)

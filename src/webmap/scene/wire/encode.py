@@ -10,6 +10,7 @@ from webmap.base.geometry import Affine
 from webmap.scene.allowed import ATTRIBUTES, EVENTS
 from webmap.scene.document import BoundElement, Document
 from webmap.scene.element import Element
+from webmap.scene.live import Line
 from webmap.scene.node import Added, Changed, Fragment, Node, Removed, Text
 from webmap.scene.wire.opcodes import (
     AFTER,
@@ -109,7 +110,7 @@ def _encode_changes(fragment: Fragment, since: int) -> bytes | None:
         fragment.mark_sent()
         for node, slot in fragment.values_since(since):
             if slot != "dots":
-                _put_slot(out, node, slot)
+                _put_slot(out, node, slot, since)
         return bytes(out) if len(out) > empty else b""
     changes = fragment.changes_since(since)
     if changes is None:
@@ -119,7 +120,7 @@ def _encode_changes(fragment: Fragment, since: int) -> bytes | None:
             case Changed(_, "dots"):
                 continue
             case Changed(node, slot):
-                _put_slot(out, node, slot)
+                _put_slot(out, node, slot, since)
             case Removed(node_id):
                 out.append(Op.REMOVE)
                 out += varint(node_id)
@@ -181,18 +182,21 @@ def _head(out: bytearray, op: int, node: Node) -> None:
 # Values -------------------------------------------------------------------------
 
 
-def _put_slot(out: bytearray, node: Node, slot: str) -> None:
+def _put_slot(out: bytearray, node: Node, slot: str, since: int = -1) -> None:
     put = _SLOTS.get(slot)
     if put is not None:
         put(out, node)
     elif slot.startswith("--"):
         _put_style(out, cast("Element", node), slot)
     else:
-        _put_attribute(out, cast("Element", node), slot)
+        _put_attribute(out, cast("Element", node), slot, since)
 
 
-def _put_attribute(out: bytearray, element: Element, name: str) -> None:
+def _put_attribute(out: bytearray, element: Element, name: str, since: int) -> None:
     value = element._attributes.get(name)
+    if isinstance(value, Line):
+        _put_line(out, element, value, since)
+        return
     number = _ATTRIBUTE.get(name)
     if number is not None:
         _head(out, Op.UNSET if value is None else Op.ATTRIBUTE, element)
@@ -202,6 +206,14 @@ def _put_attribute(out: bytearray, element: Element, name: str) -> None:
         out += string(name)
     if value is not None:
         out += string(value)
+
+
+def _put_line(out: bytearray, element: Element, line: Line, since: int) -> None:
+    whole = new = len(line)
+    if since >= 0 and element.fragment is not None:
+        new = line.new_since(element.fragment, since)
+    _head(out, Op.LINE, element)
+    out += varint(whole) + varint(new) + line.points[8 * (whole - new) :]
 
 
 def _put_style(out: bytearray, element: Element, name: str) -> None:

@@ -82,6 +82,7 @@ class Op(IntEnum):
     EMPTY = 51  # v id: drop the page's own content of a bound element
     MAP = 52  # v id of svg, v id of world, f32 width, f32 height (0: its container's)
     RAYS = 53  # v id, and the bytes of webmap.scene.wire.rays
+    LINE = 54  # v id, v length, v count, count times (f32 x, f32 y): its last points
 
 
 TABLES = {
