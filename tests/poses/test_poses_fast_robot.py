@@ -9,12 +9,19 @@ from equipment.fake_rosbridge import bridged, until
 from webmap import Robot
 from webmap.core.frame_pace import FramePace
 from webmap.poses.frames import PERIOD
+from webmap.poses.odometry import SharedThrottle
 from webmap.ros.tf import Transform
 from webmap.ros.tf.buffer import HISTORY
 from webmap.ros.tf.track import MOST, Track
 
 COUNT = 2000
 LEVEL = {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
+
+
+@pytest.fixture(autouse=True)
+def no_other_robots(monkeypatch):
+    """Count only the robots of the test, and not those of earlier tests."""
+    monkeypatch.setattr("webmap.poses.odometry.shared_throttle", SharedThrottle())
 
 
 def header(number: int, frame: str) -> dict:

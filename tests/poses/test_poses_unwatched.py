@@ -9,6 +9,7 @@ from pose_script import ODOMETRY, odometry, play, transform, transforms
 from webmap import Bridge, Robot
 from webmap.base.audience import RARELY, audience
 from webmap.features.alerts.alerts import conditions
+from webmap.poses.odometry import SharedThrottle
 from webmap.poses.silence import PERIODS
 
 LOST_AFTER = PERIODS * RARELY / 1000
@@ -32,6 +33,12 @@ def robot(bridge):
     robot.set_odometry_topic(bridge, "/odom", type=ODOMETRY)
     yield robot
     robot.destroy()
+
+
+@pytest.fixture(autouse=True)
+def no_other_robots(monkeypatch):
+    """Count only the robots of the test, and not those of earlier tests."""
+    monkeypatch.setattr("webmap.poses.odometry.shared_throttle", SharedThrottle())
 
 
 def throttle(bridge):

@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+import weakref
 from collections.abc import Callable
 from typing import Any
 
@@ -44,16 +45,16 @@ class SharedThrottle:
     def __init__(self) -> None:
         self.value = THROTTLES[0][1]
         """The least time between two messages of a robot, in milliseconds."""
-        self._feeds: dict[OdometryFeed, None] = {}
+        self._feeds: weakref.WeakSet[OdometryFeed] = weakref.WeakSet()
 
     def join(self, feed: "OdometryFeed") -> None:
         """Count a feed, and change the others if there are many now."""
-        self._feeds[feed] = None
+        self._feeds.add(feed)
         self._update()
 
     def leave(self, feed: "OdometryFeed") -> None:
         """Count a feed no more; does nothing if it is not counted."""
-        self._feeds.pop(feed, None)
+        self._feeds.discard(feed)
         self._update()
 
     def _update(self) -> None:
@@ -65,7 +66,8 @@ class SharedThrottle:
                 feed.change_pace()
 
 
-_shared = SharedThrottle()
+shared_throttle = SharedThrottle()
+"""The throttle of this process."""
 
 
 class OdometryFeed:
@@ -119,7 +121,7 @@ class OdometryFeed:
         self._subscription: Subscription | None = None
         self._type_query: Removable | None = None
         if self._shares:
-            _shared.join(self)
+            shared_throttle.join(self)
         if type is None:
             self._type_query = TypeQuery(
                 bridge, topic, self._on_type, self._listen_untyped
@@ -131,7 +133,7 @@ class OdometryFeed:
     def _asked(self) -> SubscriptionOptions:
         throttle = FAR if self.throttle is None else self.throttle
         if self._shares:
-            throttle = _shared.value
+            throttle = shared_throttle.value
         return SubscriptionOptions(throttle=throttle, unwatched=self._unwatched)
 
     @property
@@ -158,7 +160,7 @@ class OdometryFeed:
             if thing is not None:
                 thing.remove()
         self._subscription = self._type_query = None
-        _shared.leave(self)
+        shared_throttle.leave(self)
 
     def _listen_untyped(self) -> None:
         """Determine the type from the first message: the bridge may not know the type.
