@@ -4,7 +4,16 @@
  */
 
 import { checkedList } from "../web/layout.js";
-import { byId, html, setHidden, setText, svg, typing } from "../web/tools/elements.js";
+import {
+  byId,
+  html,
+  onBeat,
+  setAttribute,
+  setHidden,
+  setText,
+  svg,
+  typing,
+} from "../web/tools/elements.js";
 
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {Listed & {row: HTMLElement}} Row */
@@ -12,9 +21,9 @@ import { byId, html, setHidden, setText, svg, typing } from "../web/tools/elemen
 /** The key of the choice in this browser's storage. */
 const KEPT = "webmap.list";
 
-/** Milliseconds between two counts, and between two changes of the order. */
-const COUNT_EVERY = 500;
-const ORDER_EVERY = 2000;
+/** Beats between two counts, and between two changes of the order. */
+const COUNT_EVERY = 2;
+const ORDER_EVERY = 8;
 
 /**
  * @param {MapCanvas} map
@@ -92,12 +101,10 @@ class RobotList {
       arrange();
     });
     newcomers.observe(this._list, { childList: true });
-    const counts = setInterval(() => this._update(), COUNT_EVERY);
-    const orders = setInterval(arrange, ORDER_EVERY);
+    const offs = [onBeat(() => this._update(), COUNT_EVERY), onBeat(arrange, ORDER_EVERY)];
     signal.addEventListener("abort", () => {
       newcomers.disconnect();
-      clearInterval(counts);
-      clearInterval(orders);
+      for (const off of offs) off();
     });
   }
 
@@ -165,10 +172,11 @@ class RobotList {
       this._chips.set(group, chip);
       const row = rows.find((each) => each.group === group)?.row;
       const shape = row?.querySelector(".shape.now use")?.getAttribute("href");
-      if (shape) chip.querySelector("use")?.setAttribute("href", shape);
-      if (row) chip.dataset.tone = row.dataset.tone ?? "";
+      const use = chip.querySelector("use");
+      if (shape && use) setAttribute(use, "href", shape);
+      if (row) setAttribute(chip, "data-tone", row.dataset.tone ?? "");
       setText(/** @type {Element} */ (chip.lastElementChild), `${count} ${group}`);
-      chip.setAttribute("aria-pressed", `${states.includes(group)}`);
+      setAttribute(chip, "aria-pressed", `${states.includes(group)}`);
       // A chip that is moved loses the focus.
       if (place.children[index] !== chip) place.insertBefore(chip, place.children[index] ?? null);
     });

@@ -240,8 +240,9 @@ class Alarm {
     setText(this._names, news.map(([, words]) => words).join(", "));
     const silent = news.every(([, words]) => words.includes(MAY_MOVE));
     setText(this._title, silent ? "ROBOT MAY STILL BE MOVING" : "ROBOT NOT OBEYING");
-    if (news.length === 0) this.destroy();
-    else {
+    if (news.length === 0) {
+      if (this._element.isConnected) this.destroy();
+    } else {
       if (!this._element.isConnected) this._begin();
       this._place();
     }

@@ -1,4 +1,4 @@
-import { html, setHidden, setText } from "../../web/tools/elements.js";
+import { html, onBeat, setHidden, setText } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 import { foldedTool } from "../../web/tools/tool.js";
 
@@ -14,8 +14,8 @@ const OF = "\n";
 /** Greatest number of listed drawings of a layer; others are only switched together. */
 const MOST = 16;
 
-/** Milliseconds between two updates of an open list. */
-const PERIOD = 1000;
+/** Beats between two updates of an open list. */
+const PERIOD = 4;
 
 /** Sorts the layers of robot_2 before those of robot_10. */
 const order = new Intl.Collator("en", { numeric: true });
@@ -89,7 +89,7 @@ class LayerSwitches {
     const content = [this._list, this._none];
     this._details = foldedTool("webmap-layers", "layers", "Layers", menu, ...content);
     this._details.addEventListener("toggle", () => this._look());
-    this._timer = setInterval(() => this._look(), PERIOD);
+    this._off = onBeat(() => this._look(), PERIOD);
     // A page that finds things by name needs the list while it is closed too.
     this._ending = new AbortController();
     const { signal } = this._ending;
@@ -109,7 +109,7 @@ class LayerSwitches {
   }
 
   destroy() {
-    clearInterval(this._timer);
+    this._off();
     this._ending.abort();
     this._leave();
     this._take();
