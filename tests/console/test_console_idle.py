@@ -5,7 +5,7 @@ The tests count changes of the page, styles and layouts; they measure no time.
 
 import pytest
 from console_ready import select, wait_until_ready
-from playwright.sync_api import Page
+from playwright.sync_api import CDPSession, Page
 
 pytestmark = pytest.mark.browser
 
@@ -42,12 +42,9 @@ def idle(open_console) -> Page:
     return page
 
 
-def counts(page: Page) -> tuple[float, float]:
+def counts(session: CDPSession) -> tuple[float, float]:
     """Return how often the browser has computed styles and layouts of the page."""
-    session = page.context.new_cdp_session(page)
-    session.send("Performance.enable")
     metrics = session.send("Performance.getMetrics")["metrics"]
-    session.detach()
     numbers = {each["name"]: each["value"] for each in metrics}
     return numbers["RecalcStyleCount"], numbers["LayoutCount"]
 
@@ -61,8 +58,10 @@ def test_an_idle_console_writes_nothing_that_stays_the_same(idle, selected) -> N
 
 
 def test_an_idle_console_computes_layouts_for_ages_only_and_no_styles(idle) -> None:
-    styles, layouts = counts(idle)
+    session = idle.context.new_cdp_session(idle)
+    session.send("Performance.enable")  # counts from now on
+    styles, layouts = counts(session)
     idle.wait_for_timeout(SECONDS * 1000)
-    more_styles, more_layouts = counts(idle)
+    more_styles, more_layouts = counts(session)
     assert more_styles - styles <= SECONDS
     assert more_layouts - layouts <= LAYOUTS_A_SECOND * SECONDS

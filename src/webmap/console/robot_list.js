@@ -7,6 +7,7 @@ import { checkedList } from "../web/layout.js";
 import {
   byId,
   html,
+  inOrder,
   onBeat,
   setAttribute,
   setHidden,
@@ -325,9 +326,6 @@ export const MANY = 8;
 /** @type {Choice} */
 export const AT_FIRST = { order: "auto", group: "none", states: [] };
 
-/** `Robot 2` comes before `Robot 10`. */
-const natural = new Intl.Collator(undefined, { numeric: true });
-
 /** @type {Record<Order, (one: Listed, other: Listed) => number>} */
 const COMPARE = {
   auto: () => 0,
@@ -358,7 +356,7 @@ export function orderFor(order, count) {
 export function arranged(robots, { order, group }) {
   const used = orderFor(order, robots.length);
   const byName = (/** @type {T} */ one, /** @type {T} */ other) =>
-    used === "added" ? 0 : natural.compare(one.name, other.name);
+    used === "added" ? 0 : inOrder(one.name, other.name);
   const sorted = [...robots].sort(
     (one, other) => COMPARE[used](one, other) || byName(one, other) || one.added - other.added,
   );
@@ -370,7 +368,7 @@ export function arranged(robots, { order, group }) {
     groups.set(key, [...(groups.get(key) ?? []), robot]);
   }
   const names = [...groups.keys()].sort(
-    (one, other) => Number(one === "") - Number(other === "") || natural.compare(one, other),
+    (one, other) => Number(one === "") - Number(other === "") || inOrder(one, other),
   );
   return names.map((name) => ({
     name: name || `No ${group}`,

@@ -186,8 +186,10 @@ export function markRobots(map) {
     showNames(map, robots, places, joined);
   };
   const offs = [onBeat(update), map.onSelect(update), map.onView(() => marks.place())];
-  update();
+  // With the other modules, before the next painting: it reads styles.
+  const first = requestAnimationFrame(update);
   return () => {
+    cancelAnimationFrame(first);
     for (const off of offs) off();
     marks.remove();
   };

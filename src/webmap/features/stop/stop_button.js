@@ -5,6 +5,7 @@ import { Obedience, standingStops } from "../../web/motion/stops.js";
 import {
   button,
   html,
+  inOrder,
   setHidden,
   setText,
   stopButton,
@@ -189,7 +190,7 @@ class Stop {
  * @param {Verdict} other
  */
 function byName(one, other) {
-  return one.name.localeCompare(other.name, undefined, { numeric: true });
+  return inOrder(one.name, other.name);
 }
 
 /** Covers the page: a robot does not follow its commands, or perhaps gets none. */

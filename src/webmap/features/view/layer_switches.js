@@ -1,4 +1,4 @@
-import { html, onBeat, setHidden, setText } from "../../web/tools/elements.js";
+import { html, inOrder, onBeat, setHidden, setText } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 import { foldedTool } from "../../web/tools/tool.js";
 
@@ -16,9 +16,6 @@ const MOST = 16;
 
 /** Beats between two updates of an open list. */
 const PERIOD = 4;
-
-/** Sorts the layers of robot_2 before those of robot_10. */
-const order = new Intl.Collator("en", { numeric: true });
 
 let maps = 0;
 
@@ -64,7 +61,7 @@ export function hidingRules(layers, shown, scope) {
 export function drawingNames(drawings) {
   const found = new Set();
   for (const { dataset } of drawings) if (dataset.layer) found.add(dataset.layer);
-  const names = [...found].sort(order.compare);
+  const names = [...found].sort(inOrder);
   return names.length > 1 ? names : [];
 }
 
@@ -177,7 +174,7 @@ class LayerSwitches {
   _arrange() {
     const rows = this._layers.flatMap(([name]) => {
       const keys = [...this._rows.keys()].filter((key) => key.split(OF)[0] === name);
-      const found = keys.sort(order.compare).map((key) => this._rows.get(key));
+      const found = keys.sort(inOrder).map((key) => this._rows.get(key));
       return [...found, this._notes.get(name)].filter((row) => row !== undefined);
     });
     this._list.replaceChildren(...rows);

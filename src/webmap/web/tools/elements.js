@@ -139,6 +139,20 @@ export function setAttribute(element, name, value) {
   if (element.getAttribute(name) !== value) element.setAttribute(name, value);
 }
 
+/** @type {Intl.Collator | undefined} Made at its first use, which takes 15 ms. */
+let collator;
+
+/**
+ * Compare names as people order them: "robot 9" before "robot 10".
+ *
+ * @param {string} one
+ * @param {string} other
+ */
+export function inOrder(one, other) {
+  collator ??= new Intl.Collator(undefined, { numeric: true });
+  return collator.compare(one, other);
+}
+
 /** Milliseconds of a beat. */
 const BEAT = 250;
 
