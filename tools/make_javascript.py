@@ -19,7 +19,13 @@ from webmap.ros.messages import LOG_LEVELS
 from webmap.scene.wire.messages import LONGEST_TEXTS, MOST_UNSEEN, PAGE_ID
 from webmap.scene.wire.opcodes import TABLES, VERSION
 from webmap.server.access import CODE, KEY, PROTOCOL
-from webmap.server.bundles import FIRST_PARTS, PART_FOLDERS, PART_SHEETS, PARTS
+from webmap.server.bundles import (
+    FIRST_PARTS,
+    FIRST_SHEETS,
+    PART_FOLDERS,
+    PART_SHEETS,
+    PARTS,
+)
 from webmap.server.html import FOLDER
 from webmap.server.page_socket import BROKEN_RULE, REPLACED
 
@@ -61,7 +67,8 @@ def constants_js() -> str:
             FIRST_PARTS,
             "The bundle of each browser part that a page starts with.",
         ),
-        "PART_SHEETS": (PART_SHEETS, "The style sheet of these parts."),
+        "FIRST_SHEETS": (FIRST_SHEETS, "The style sheet of STOP and driving."),
+        "PART_SHEETS": (PART_SHEETS, "The style sheet of the other parts."),
         "PROTOCOL": (PROTOCOL, "The subprotocol of both sockets."),
         "CODE": (CODE, "The field of a query that signs in once."),
         "KEY": (KEY, "The element and the header with the secret of a page."),

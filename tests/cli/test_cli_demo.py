@@ -1,17 +1,38 @@
 """``webmap demo``: its robots match the robots of the simulator."""
 
 import asyncio
+from contextlib import contextmanager
 from types import SimpleNamespace
 
 import pytest
 
 from webmap import Bridge
-from webmap.base.errors import BridgeClosed
-from webmap.cli import demo_robots
+from webmap.base.errors import BridgeClosed, ConfigError
+from webmap.cli import demo, demo_robots
 from webmap.cli.demo import simulator
 from webmap.cli.demo_robots import FREE, PauseErrands, demo_robot
 from webmap.discovery import discover
 from webmap.ros.temporary_bridge import ask_topics
+
+
+def test_the_console_is_opened_while_the_simulator_starts(monkeypatch):
+    done = []
+
+    @contextmanager
+    def starting(*options):
+        def url():
+            done.append("waited")
+            raise ConfigError("that is enough")
+
+        done.append("started")
+        yield url
+
+    monkeypatch.setattr(demo, "starting_simulator", starting)
+    monkeypatch.setattr(demo, "_open_console", lambda *_, **__: done.append("opened"))
+    with pytest.raises(ConfigError, match="enough"):
+        demo.demo.main(["--no-browser"], standalone_mode=False)
+    assert done == ["started", "opened", "waited"]
+
 
 DIALECTS = pytest.mark.parametrize("dialect", ["ros1", "ros2"])
 

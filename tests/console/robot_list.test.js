@@ -72,3 +72,9 @@ test("a robot is shown if its name and its state are wanted", () => {
   assert.ok(!isShown(robot("Robot 1"), "", ["lost"]));
   assert.ok(!isShown(robot("Robot 1"), "2", []));
 });
+
+test("nothing that compares names in a language is made while modules load", async (t) => {
+  const made = t.mock.method(Intl, "Collator");
+  await import("../../src/webmap/console/robot_list.js?again");
+  assert.equal(made.mock.callCount(), 0);
+});

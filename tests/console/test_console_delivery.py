@@ -12,19 +12,19 @@ import pytest
 from console_ready import wait_until_ready
 from playwright.sync_api import Browser, Page, Route
 
-from webmap.server.bundles import STARTS
+from webmap.server.bundles import FIRST_SHEETS, PART_SHEETS, PARTS, STARTS
 from webmap.server.own_files import own_files
 
 pytestmark = pytest.mark.browser
 
 ROBOTS = 1
 
-MOST_REQUESTS = 20
+MOST_REQUESTS = 15
 MOST_BYTES = 110_000
 """The limits until the first robot is shown. The page needs about 12 requests and 97 kB
 with the images of the map."""
 
-MOST_REQUESTS_IN_ALL = 20
+MOST_REQUESTS_IN_ALL = 15
 
 BINARY = 2
 """The opcode of a frame of the scene; all other frames are text."""
@@ -194,12 +194,11 @@ def test_the_first_picture_comes_while_the_page_still_loads(demo, chromium) -> N
 def test_only_stop_and_driving_are_loaded_before_the_first_robot_is_shown(
     opened: Opened,
 ) -> None:
-    before = [
-        one.path.partition("/features/")[2]
-        for one in opened.before_robot()
-        if "/features/" in one.path
-    ]
-    assert {one.partition("/")[0] for one in before} == {"stop", "drive"}, before
+    begun = {one.path for one in opened.before_robot()}
+    files = f"/_webmap/v-{own_files.version()}/"
+    assert files + FIRST_SHEETS in begun
+    assert not {files + PARTS, files + PART_SHEETS} & begun
+    assert not [path for path in begun if "/features/" in path]
 
 
 def test_stop_and_driving_do_not_wait_for_the_first_picture(opened: Opened) -> None:

@@ -13,7 +13,7 @@ from gate_robot import eventually
 from webmap.base.geometry import Twist
 from webmap.gate.display.client import GateClient
 from webmap.gate.protocol import AssistSpec, RobotReport, RobotSpec
-from webmap.gate.rules.assist import polygon_around
+from webmap.gate.specs import polygon_around
 
 RADIUS = 0.25
 

@@ -8,8 +8,12 @@ from hypothesis import strategies as st
 
 from equipment.gate_harness import spec
 from webmap.base.errors import ConfigError
-from webmap.gate.rules.assist import polygon_around
-from webmap.gate.specs import MOST_CORNERS, checked, why_no_outline
+from webmap.gate.specs import (
+    MOST_CORNERS,
+    checked,
+    polygon_around,
+    why_no_outline,
+)
 from webmap.ros import names
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))

@@ -35,6 +35,12 @@ def test_importing_webmap_loads_no_heavy_package() -> None:
     assert not loaded_by("import webmap") & (HEAVY | {"websockets", "msgspec"})
 
 
+def test_opening_the_console_loads_neither_the_check_of_bridges_nor_scan_assist():
+    loaded = modules_after("import webmap.console, webmap.server.runner")
+    later = ("webmap.discovery.doctor.", "webmap.gate.rules.assist")
+    assert not [name for name in loaded if name.startswith(later)]
+
+
 @pytest.mark.parametrize(
     "module", ["webmap.gate.__main__", "webmap.gate.display.client"]
 )

@@ -1,5 +1,6 @@
 """The modules and style sheets of WebMap that browsers receive."""
 
+import gzip
 import json
 import re
 import shutil
@@ -10,6 +11,7 @@ import pytest
 
 from webmap.server.bundles import (
     FIRST_PARTS,
+    FIRST_SHEETS,
     PART_FOLDERS,
     PART_SHEETS,
     PARTS,
@@ -89,6 +91,15 @@ def test_each_module_of_webmap_is_served_once_and_a_page_starts_with_few():
             todo.append(needed.relative_to(PACKAGE).as_posix())
     assert loaded == set(STARTS)
     assert len(STARTS) == 3
+
+
+def test_the_bundle_of_the_first_picture_has_no_inputs_commands_and_layouts():
+    text = served_modules(own_files(".js"))["web/page.js"]
+    names = re.findall(r'^\$modules\["(.+)"\] \?\?= ', text, re.M)
+    assert "web/scene.js" in names
+    later = ("web/inputs/", "web/motion/", "web/layout.js", "features/")
+    assert not [name for name in names if name.startswith(later)]
+    assert len(gzip.compress(text.encode())) < 30_000
 
 
 def test_a_source_map_has_the_source_of_each_line():
@@ -212,10 +223,12 @@ def test_all_declared_browser_parts_are_served_with_their_styles():
             assert name.startswith(PART_FOLDERS), name
             bundle = modules[FIRST_PARTS.get(name, PARTS)]
             assert f'$modules["{name}"] ??= (' in bundle, name
-        elif name.removesuffix(".css") + ".js" not in FIRST_PARTS:
+        else:
+            first = name.removesuffix(".css") + ".js" in FIRST_PARTS
             own = re.sub("@import.*", "", sheets[name]).strip()
-            assert own in sheets[PART_SHEETS], name
-    assert sheets[PART_SHEETS].count("@import") == 1
+            assert own in sheets[FIRST_SHEETS if first else PART_SHEETS], name
+    for name in (FIRST_SHEETS, PART_SHEETS):
+        assert sheets[name].count("@import") == 1
 
 
 @pytest.mark.parametrize(

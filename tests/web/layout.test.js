@@ -4,7 +4,6 @@ import {
   checkSize,
   keepView,
   keptView,
-  LayoutParts,
   LayoutRefused,
   MOST_BYTES,
   placeOf,
@@ -12,6 +11,7 @@ import {
   viewOf,
   writeLayout,
 } from "../../src/webmap/web/layout.js";
+import { LayoutParts } from "../../src/webmap/web/layout_parts.js";
 import {
   apply,
   initialView,

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from importlib.resources import as_file, files
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 from urllib.parse import urlsplit
 
@@ -18,6 +19,8 @@ from webmap.cli.demo_robots import FREE, demo_robot
 from webmap.cli.options import PORT, Finite, simulator_options, web_options
 
 if TYPE_CHECKING:
+    from webmap import Bridge
+    from webmap.console.console import Console
     from webmap.testing.fault_proxy import FaultProxy
 
 
@@ -182,21 +185,36 @@ def _give_up(status: int) -> NoReturn:
 
 
 @contextmanager
-def simulator(*arguments: object) -> Iterator[str]:
-    """Run ``webmap sim`` as a child process and yield the URL of its rosbridge.
+def starting_simulator(*arguments: object) -> Iterator[Callable[[], str]]:
+    """Run ``webmap sim`` as a child process.
 
     It ends with this process, however that ends, because its standard input closes.
+
+    Yields:
+        A function that waits for the URL of its rosbridge. It raises ConfigError if the
+        simulator does not start.
+
+    """
+    with child_process("webmap", "sim", "--with-parent", *arguments) as started:
+
+        def url() -> str:
+            if not started.line.startswith(READY):
+                _give_up(started.process.wait(GRACE))
+            return started.line.removeprefix(READY).strip()
+
+        yield url
+
+
+@contextmanager
+def simulator(*arguments: object) -> Iterator[str]:
+    """Run ``webmap sim`` as a child process and yield the URL of its rosbridge.
 
     Raises:
         ConfigError: If it does not start.
 
     """
-    with child_process("webmap", "sim", "--with-parent", *arguments) as started:
-        # The simulator starts meanwhile, which takes half a second as well.
-        import_module("webmap.console")
-        if not started.line.startswith(READY):
-            _give_up(started.process.wait(GRACE))
-        yield started.line.removeprefix(READY).strip()
+    with starting_simulator(*arguments) as url:
+        yield url()
 
 
 ROBOTS = 5
@@ -273,21 +291,30 @@ def demo(
     if not quiet and number > FREE:
         options += ["--errands", number - FREE, "--low-battery"]
     with (
-        simulator(*options, "--dialect", dialect) as direct,
-        bad_link(direct, delay, jitter, stall) as url,
+        starting_simulator(*options, "--dialect", dialect) as simulator_url,
         as_file(files("webmap.sim") / "data") as data,
     ):
-        from webmap import console
+        # The simulator starts meanwhile, which takes half a second as well.
+        bridges: list[webmap.Bridge] = []
+        opened = _open_console(bridges, data / "floor.yaml", quiet=quiet)
+        with bad_link(simulator_url(), delay, jitter, stall) as url:
+            bridges.append(webmap.Bridge(url, name="simulator"))
+            for index in range(number):
+                opened.add(demo_robot(bridges[0], index, dialect, quiet=quiet))
+            serve()
 
-        bridge = webmap.Bridge(url, name="simulator")
-        opened = console.open_console(
-            [bridge],
-            [],
-            floor=data / "floor.yaml",
-            title="Demo",
-            place="demo",
-            layers_off=["Costmaps"] if quiet else [],
-        )
-        for index in range(number):
-            opened.add(demo_robot(bridge, index, dialect, quiet=quiet))
-        serve()
+
+def _open_console(bridges: "list[Bridge]", floor: Path, *, quiet: bool) -> "Console":
+    """Open the console before there are robots, and import what serves it."""
+    from webmap import console
+
+    import_module("webmap.server.runner").own_files.version()
+    import_module("webmap.agents.gates")
+    return console.open_console(
+        bridges,
+        [],
+        floor=floor,
+        title="Demo",
+        place="demo",
+        layers_off=["Costmaps"] if quiet else [],
+    )

@@ -2,7 +2,15 @@ import { listenToActions, listenToPanel } from "./side_panel.js";
 import { listenToPalette } from "./palette.js";
 import { listenToRobots } from "./robot_list.js";
 import { markRobots } from "./robot_marks.js";
-import { byId, listenToSheet, nameSheet, setText, typing } from "../web/tools/elements.js";
+import {
+  byId,
+  listenToSheet,
+  nameSheet,
+  onBeat,
+  setAttribute,
+  setText,
+  typing,
+} from "../web/tools/elements.js";
 import { keepInView, keepSizes, listenToList, listenToTools } from "./view_tools.js";
 
 /**
@@ -57,7 +65,7 @@ export default function attach(map, options, send) {
 function showConnection(drive) {
   const link = byId("link");
   const show = () => {
-    link.dataset.link = drive.state;
+    setAttribute(link, "data-link", drive.state);
   };
   /** @type {Map<string, boolean>} */
   const known = new Map();
@@ -79,10 +87,8 @@ function showConnection(drive) {
     count();
   };
   look();
-  const timer = setInterval(look, 500);
-  const offs = [drive.on("state", show), drive.on("robot", hear)];
+  const offs = [onBeat(look, 2), drive.on("state", show), drive.on("robot", hear)];
   return () => {
-    clearInterval(timer);
     for (const off of offs) off();
   };
 }

@@ -4,7 +4,17 @@
  */
 
 import { checkedList } from "../web/layout.js";
-import { byId, html, setHidden, setText, svg, typing } from "../web/tools/elements.js";
+import {
+  byId,
+  html,
+  inOrder,
+  onBeat,
+  setAttribute,
+  setHidden,
+  setText,
+  svg,
+  typing,
+} from "../web/tools/elements.js";
 
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {Listed & {row: HTMLElement}} Row */
@@ -12,9 +22,9 @@ import { byId, html, setHidden, setText, svg, typing } from "../web/tools/elemen
 /** The key of the choice in this browser's storage. */
 const KEPT = "webmap.list";
 
-/** Milliseconds between two counts, and between two changes of the order. */
-const COUNT_EVERY = 500;
-const ORDER_EVERY = 2000;
+/** Beats between two counts, and between two changes of the order. */
+const COUNT_EVERY = 2;
+const ORDER_EVERY = 8;
 
 /**
  * @param {MapCanvas} map
@@ -92,12 +102,10 @@ class RobotList {
       arrange();
     });
     newcomers.observe(this._list, { childList: true });
-    const counts = setInterval(() => this._update(), COUNT_EVERY);
-    const orders = setInterval(arrange, ORDER_EVERY);
+    const offs = [onBeat(() => this._update(), COUNT_EVERY), onBeat(arrange, ORDER_EVERY)];
     signal.addEventListener("abort", () => {
       newcomers.disconnect();
-      clearInterval(counts);
-      clearInterval(orders);
+      for (const off of offs) off();
     });
   }
 
@@ -165,10 +173,11 @@ class RobotList {
       this._chips.set(group, chip);
       const row = rows.find((each) => each.group === group)?.row;
       const shape = row?.querySelector(".shape.now use")?.getAttribute("href");
-      if (shape) chip.querySelector("use")?.setAttribute("href", shape);
-      if (row) chip.dataset.tone = row.dataset.tone ?? "";
+      const use = chip.querySelector("use");
+      if (shape && use) setAttribute(use, "href", shape);
+      if (row) setAttribute(chip, "data-tone", row.dataset.tone ?? "");
       setText(/** @type {Element} */ (chip.lastElementChild), `${count} ${group}`);
-      chip.setAttribute("aria-pressed", `${states.includes(group)}`);
+      setAttribute(chip, "aria-pressed", `${states.includes(group)}`);
       // A chip that is moved loses the focus.
       if (place.children[index] !== chip) place.insertBefore(chip, place.children[index] ?? null);
     });
@@ -317,9 +326,6 @@ export const MANY = 8;
 /** @type {Choice} */
 export const AT_FIRST = { order: "auto", group: "none", states: [] };
 
-/** `Robot 2` comes before `Robot 10`. */
-const natural = new Intl.Collator(undefined, { numeric: true });
-
 /** @type {Record<Order, (one: Listed, other: Listed) => number>} */
 const COMPARE = {
   auto: () => 0,
@@ -350,7 +356,7 @@ export function orderFor(order, count) {
 export function arranged(robots, { order, group }) {
   const used = orderFor(order, robots.length);
   const byName = (/** @type {T} */ one, /** @type {T} */ other) =>
-    used === "added" ? 0 : natural.compare(one.name, other.name);
+    used === "added" ? 0 : inOrder(one.name, other.name);
   const sorted = [...robots].sort(
     (one, other) => COMPARE[used](one, other) || byName(one, other) || one.added - other.added,
   );
@@ -362,7 +368,7 @@ export function arranged(robots, { order, group }) {
     groups.set(key, [...(groups.get(key) ?? []), robot]);
   }
   const names = [...groups.keys()].sort(
-    (one, other) => Number(one === "") - Number(other === "") || natural.compare(one, other),
+    (one, other) => Number(one === "") - Number(other === "") || inOrder(one, other),
   );
   return names.map((name) => ({
     name: name || `No ${group}`,

@@ -1,5 +1,5 @@
 import { WORDS } from "../web/constants.js";
-import { svg } from "../web/tools/elements.js";
+import { onBeat, svg } from "../web/tools/elements.js";
 import { scaleOf } from "../web/view.js";
 
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
@@ -10,8 +10,6 @@ import { scaleOf } from "../web/view.js";
  */
 
 
-/** Milliseconds between two checks. */
-const PERIOD = 300;
 
 /**
  * Size of texts on the screen, in pixels: about the width of a letter, the height of a
@@ -187,11 +185,11 @@ export function markRobots(map) {
     marks.show(clusters.map((cluster) => cluster.map((index) => robots[index])));
     showNames(map, robots, places, joined);
   };
-  const timer = setInterval(update, PERIOD);
-  const offs = [map.onSelect(update), map.onView(() => marks.place())];
-  update();
+  const offs = [onBeat(update), map.onSelect(update), map.onView(() => marks.place())];
+  // With the other modules, before the next painting: it reads styles.
+  const first = requestAnimationFrame(update);
   return () => {
-    clearInterval(timer);
+    cancelAnimationFrame(first);
     for (const off of offs) off();
     marks.remove();
   };

@@ -4,7 +4,7 @@
  * part of the layout, and stored in the browser.
  */
 
-import { byId, closeSheet } from "../web/tools/elements.js";
+import { byId, closeSheet, onBeat } from "../web/tools/elements.js";
 
 /** @typedef {import('../web/drive.js').Drive} Drive */
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
@@ -162,8 +162,8 @@ export function listenToActions(map, send, signal) {
     show();
   };
   byId("card").addEventListener("click", act, { signal });
-  const timer = setInterval(show, 250);
   const offs = [
+    onBeat(show),
     map.onView(show),
     map.drive.on("robot", ({ robot }) => robot === map.selected && show()),
     map.onSelect(() => {
@@ -172,7 +172,6 @@ export function listenToActions(map, send, signal) {
     }),
   ];
   return () => {
-    clearInterval(timer);
     for (const off of offs) off();
   };
 }

@@ -28,8 +28,7 @@ from webmap.config.motion import (
 from webmap.config.reading import Config, read_part
 from webmap.gate.limits import PLANE, Axes
 from webmap.gate.protocol import AssistSpec, RobotReport, RobotSpec
-from webmap.gate.rules.assist import polygon_around
-from webmap.gate.specs import checked, checked_assist
+from webmap.gate.specs import checked, checked_assist, polygon_around
 from webmap.poses.odometry import TypeQuery
 from webmap.ros.bridge import Bridge
 from webmap.ros.motion_topics import STOP

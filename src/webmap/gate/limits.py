@@ -7,10 +7,13 @@ scan assist) is one more cap in the list.
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from webmap.base.geometry import Twist
-from webmap.gate.events import StopRecord
 from webmap.gate.protocol import RobotSpec
+
+if TYPE_CHECKING:
+    from webmap.gate.events import StopRecord
 
 Vector = tuple[float, float, float]
 
@@ -116,7 +119,7 @@ class Speed:
     why: tuple[str, ...]
 
 
-def caps_of(spec: RobotSpec, tested: StopRecord | None = None) -> list[Cap]:
+def caps_of(spec: RobotSpec, tested: "StopRecord | None" = None) -> list[Cap]:
     """Return the caps of the robot itself.
 
     Args:

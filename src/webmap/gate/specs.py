@@ -7,12 +7,11 @@ edge. Both need an outline with an area and without crossing edges.
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from webmap.base.errors import ConfigError
-from webmap.gate.events import Key
 from webmap.gate.protocol import AssistSpec, Point, RobotSpec
 from webmap.ros.names import (
     has_gate,
@@ -23,6 +22,9 @@ from webmap.ros.names import (
     split_type,
 )
 
+if TYPE_CHECKING:
+    from webmap.gate.events import Key
+
 MOST_CORNERS = 100
 """The most corners of an outline: each costs time with every command."""
 
@@ -31,6 +33,13 @@ LEAST_AREA = 1e-4
 
 FARTHEST = 1000.0
 """The most metres from the robot's origin to a corner, along x and along y."""
+
+
+def polygon_around(radius: float, corners: int = 12) -> tuple[Point, ...]:
+    """Return the corners of a regular polygon around a disc, in order."""
+    outer = radius / math.cos(math.pi / corners)
+    turns = (math.tau * corner / corners for corner in range(corners))
+    return tuple((outer * math.cos(turn), outer * math.sin(turn)) for turn in turns)
 
 
 def why_no_outline(corners: Sequence[Point]) -> str | None:
@@ -273,11 +282,13 @@ def check_twist_type(spec: RobotSpec, others: Iterable[RobotSpec]) -> None:
             )
 
 
-def key_of(spec: RobotSpec) -> Key:
+def key_of(spec: RobotSpec) -> "Key":
     """Return the key of the machine of a checked ``spec``.
 
     A robot without a velocity topic has the place of its goals as its key.
     """
+    from webmap.gate.events import Key  # the display checks specs without the events
+
     if spec.twist_topic is not None:
         return Key(spec.bridge_url, spec.twist_topic)
     goal = spec.goal_topic or spec.action or f"robot {spec.id}"

@@ -41,6 +41,9 @@ PARTS = "parts.js"
 PART_FOLDERS = ("console/", "features/")
 """Where the modules of browser parts are, which a page gets from the bundles."""
 
+FIRST_SHEETS = "first_parts.css"
+"""The style sheet of the browser parts of :data:`FIRST_PARTS`."""
+
 PART_SHEETS = "parts.css"
 """The style sheet of the browser parts of :data:`PARTS`."""
 
@@ -180,7 +183,7 @@ def served_sheets(
 ) -> dict[str, str]:
     """Return each style sheet with the sheets that it imports in place of the imports.
 
-    :data:`PART_SHEETS` is among them.
+    :data:`FIRST_SHEETS` and :data:`PART_SHEETS` are among them.
 
     Args:
         sources: The text of each sheet by name, such as ``"web/webmap.css"``.
@@ -203,12 +206,13 @@ def served_sheets(
         return "".join(mark if n == shared else rules(n) for n in needed) + found[2]
 
     texts = {name: rules(name) for name in sources}
-    texts[PART_SHEETS] = "".join(
-        text
-        for name, text in texts.items()
-        if name.startswith(_SHEET_FOLDERS)
-        and name.removesuffix(".css") + ".js" not in FIRST_PARTS
-    )
+    first = [name.removesuffix(".js") + ".css" for name in FIRST_PARTS]
+    others = [name for name in texts if name.startswith(_SHEET_FOLDERS)]
+    for bundle, names in (
+        (FIRST_SHEETS, first),
+        (PART_SHEETS, [name for name in others if name not in first]),
+    ):
+        texts[bundle] = "".join(texts.get(name, "") for name in names)
     for name, text in texts.items():
         if mark in text:
             address = _address(shared, name)

@@ -1,3 +1,5 @@
+import { onBeat } from "./tools/elements.js";
+
 /** @typedef {import('./item.js').Item} Item */
 
 /**
@@ -7,9 +9,6 @@
  * @property {boolean} shown Whether the element shows the age as text.
  * @property {boolean | null} stale Whether the data was stale at the last update.
  */
-
-/** Milliseconds between two updates. */
-const PERIOD = 250;
 
 /** With more ages than this, only every other update writes those that are not new. */
 const MANY = 200;
@@ -40,7 +39,8 @@ export class Ages {
     /** @type {Set<Item>} */
     this._urgent = new Set();
     this._looks = 0;
-    this._timer = setInterval(() => this._look(), PERIOD);
+    /** Ends the updates. */
+    this.stop = onBeat(() => this._look());
   }
 
   _look() {
@@ -80,10 +80,6 @@ export class Ages {
     if (this._urgent.size === 0) return;
     this._show(this._urgent, true);
     this._urgent.clear();
-  }
-
-  stop() {
-    clearInterval(this._timer);
   }
 
   /**

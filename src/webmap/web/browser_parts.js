@@ -1,5 +1,11 @@
 import { OWN_FILES, resolve } from "./access.js";
-import { FIRST_PARTS, PARTS, PART_FOLDERS, PART_SHEETS } from "./constants.js";
+import {
+  FIRST_PARTS,
+  FIRST_SHEETS,
+  PARTS,
+  PART_FOLDERS,
+  PART_SHEETS,
+} from "./constants.js";
 
 /** @typedef {import('./map.js').MapCanvas} MapCanvas */
 
@@ -62,7 +68,8 @@ export class BrowserParts {
     const url = resolve(module, OWN_FILES);
     const part = ownPart(url);
     const first = part !== null && FIRST.has(part);
-    const style = css ? this._addStyle(part && !first ? PART_SHEETS : css) : null;
+    const sheet = first ? FIRST_SHEETS : PART_SHEETS;
+    const style = css ? this._addStyle(part ? sheet : css) : null;
     const load = () => {
       if (style) style.link.href = style.url;
       const code = part ? partOf(part) : moduleOf(url);

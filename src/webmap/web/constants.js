@@ -15,7 +15,10 @@ export const FIRST_PARTS = Object.freeze({
   "features/drive/teleop.js": "web/drive.js",
 });
 
-/** The style sheet of these parts. */
+/** The style sheet of STOP and driving. */
+export const FIRST_SHEETS = "first_parts.css";
+
+/** The style sheet of the other parts. */
 export const PART_SHEETS = "parts.css";
 
 /** The subprotocol of both sockets. */

@@ -1,5 +1,5 @@
 import { Crowd } from "./crowd.js";
-import { LayoutParts } from "./layout.js";
+import { LayoutParts } from "./layout_parts.js";
 import { contentSize } from "./sizes.js";
 import {
   apply,

@@ -1,7 +1,3 @@
-import { devicesOf } from "./inputs/devices.js";
-import { standingStops } from "./motion/stops.js";
-import { html, setText, stopButton } from "./tools/elements.js";
-
 /** Milliseconds for which a dismissed failure is not shown again. */
 const SILENCE = 60_000;
 /** Milliseconds for which what is over stays visible, to be readable. */
@@ -327,27 +323,4 @@ function widestSpan(area, taken) {
 export function meets(one, other) {
   const across = one.left < other.right && other.left < one.right;
   return across && one.top < other.bottom && other.top < one.bottom;
-}
-
-/**
- * Show STOP ALL on a page without a picture, which has no other STOP; the keys act too.
- *
- * @param {import('./drive.js').Drive} drive
- * @returns {() => void} Removes it.
- */
-export function showBareStop(drive) {
-  const all = stopButton("", "STOP ALL", () => void drive.stop("*"));
-  const result = html("p", "", { role: "status" });
-  const label = { "aria-label": "STOP for all robots" };
-  const box = html("section", "webmap-notice alert webmap-bare-stop", label, all, result);
-  const show = () => {
-    const waiting = drive.verdicts.map(({ name, text }) => `${name}: ${text}.`);
-    setText(result, standingStops(drive.robots.values()) || waiting.join(" "));
-  };
-  const offs = [devicesOf(drive).open(), drive.on("step", show)];
-  document.body.append(box);
-  return () => {
-    for (const off of offs) off();
-    box.remove();
-  };
 }

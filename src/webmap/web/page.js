@@ -11,7 +11,7 @@ import { LONGEST_TEXTS } from "./constants.js";
 import { Reports } from "./events.js";
 import { BrowserParts, importOf } from "./browser_parts.js";
 import { AnswerPace, Link } from "./link.js";
-import { Notices, showBareStop } from "./notices.js";
+import { Notices } from "./notices.js";
 import { dark, id, path, sceneAddress, takeFirstSocket } from "./opening.js";
 import { Scene } from "./scene.js";
 import { VersionError } from "./wire.js";
@@ -56,8 +56,8 @@ export class Page {
     );
     /** @type {Drive | null} */
     this._drive = null;
-    /** @type {(typeof import('./drive.js').Drive) | null} */
-    this._Drive = null;
+    /** @type {typeof import('./drive.js') | null} */
+    this._driving = null;
     /** @type {Array<{data: ArrayBuffer, received: number}>} */
     this._frames = [];
     this._drawing = 0;
@@ -98,8 +98,8 @@ export class Page {
    */
   get drive() {
     if (this._drive) return this._drive;
-    if (!this._Drive) throw new Error("drive.js has not been loaded");
-    this._drive = new this._Drive(BASE, { id: this.id });
+    if (!this._driving) throw new Error("drive.js has not been loaded");
+    this._drive = new this._driving.Drive(BASE, { id: this.id });
     this._drive.on("gamepad", (why) => {
       if (why) this.notices.show("gamepad", why, "alert");
       else this.notices.hide("gamepad");
@@ -107,8 +107,10 @@ export class Page {
     return this._drive;
   }
 
+  /** @returns {Promise<typeof import('./drive.js')>} */
   async _loadDrive() {
-    this._Drive ??= (await importOf(new URL("drive.js", import.meta.url).href)).Drive;
+    const { href } = new URL("drive.js", import.meta.url);
+    return (this._driving ??= await importOf(href));
   }
 
   /**
@@ -185,7 +187,7 @@ export class Page {
     if (this._offersStop || !this._hideBareStop) return;
     this._offersStop = true;
     try {
-      await this._loadDrive();
+      const { showBareStop } = await this._loadDrive();
       if (this._hideBareStop) this._hideBareStop = showBareStop(this.drive);
     } catch {
       this._offersStop = false; // without a network; the next attempt may succeed

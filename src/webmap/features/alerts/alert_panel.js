@@ -1,4 +1,4 @@
-import { button, html, setHidden, setText, svg } from "../../web/tools/elements.js";
+import { button, html, onBeat, setHidden, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 import { foldedTool } from "../../web/tools/tool.js";
 import { Pace, Signals } from "./alert_signal.js";
@@ -30,8 +30,8 @@ import { Pace, Signals } from "./alert_signal.js";
  * @property {number | null} acknowledged
  */
 
-/** Milliseconds between two checks whether a signal is due. */
-const PERIOD = 500;
+/** Beats between two checks whether a signal is due. */
+const PERIOD = 2;
 
 /** Kept while a page reconnects, so that no alert is signalled twice. */
 const pace = new Pace();
@@ -118,13 +118,13 @@ class AlertPanel {
     );
     this._details.querySelector("summary")?.append(this._badge);
     this._take = lay(map, this._details, "top-left");
-    this._timer = setInterval(() => this._signal(), PERIOD);
+    this._off = onBeat(() => this._signal(), PERIOD);
     this._heard = false;
     this._show(0);
   }
 
   destroy() {
-    clearInterval(this._timer);
+    this._off();
     this._signals.destroy();
     this._take();
   }

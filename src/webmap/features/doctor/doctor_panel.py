@@ -10,13 +10,11 @@ from collections.abc import Awaitable, Callable, Coroutine, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from webmap import html, svg
-from webmap.discovery.doctor import BridgeFacts, ConfiguredRobot, Finding, judge
-from webmap.discovery.doctor.measure import TRYING, observe, tried
-from webmap.discovery.doctor.verdict import report as report_text
-from webmap.features.doctor.configured_robots import configured_robots
 
+# The console opens without the check's own modules: they are imported for a check.
 if TYPE_CHECKING:
     from webmap import Bridge, Element, Map
+    from webmap.discovery.doctor import BridgeFacts, ConfiguredRobot, Finding
 
 LEVEL_NAMES = {"wrong": "Wrong", "warning": "Warning", "note": "Note", "good": "Good"}
 
@@ -149,6 +147,8 @@ class Report:
 
     def _start(self) -> None:
         """Check the robots that are shown now, with the topics that they use now."""
+        from webmap.features.doctor.configured_robots import configured_robots
+
         made = self._map.module_arguments()
         self._checkup.start(configured_robots(self._map.robots, self._bridge, made))
 
@@ -203,7 +203,7 @@ SECONDS = 3.0
 
 PLURAL = {"wrong": "wrong", "warning": "warnings", "note": "notes", "good": "good"}
 
-Observe = Callable[..., Awaitable[BridgeFacts]]
+Observe = Callable[..., Awaitable["BridgeFacts"]]
 
 
 class Checkup:
@@ -214,12 +214,13 @@ class Checkup:
 
     Args:
         url: The bridge's address.
-        observe: Observes a bridge.
-        tried: Takes the observation, tries a call that hangs, and adds the result.
+        observe: Observes a bridge; that of ``measure`` if not given.
+        tried: Takes the observation, tries a call that hangs, and adds the result; that
+            of ``measure`` if not given.
     """
 
     def __init__(
-        self, url: str, observe: Observe = observe, tried: Observe = tried
+        self, url: str, observe: Observe | None = None, tried: Observe | None = None
     ) -> None:
         self.url = url
         self.version = 0
@@ -263,9 +264,11 @@ class Checkup:
     @property
     def text(self) -> str:
         """All findings as plain text."""
-        return report_text(self.url, self.findings)
+        from webmap.discovery.doctor.verdict import report
 
-    def start(self, robots: Sequence[ConfiguredRobot] = ()) -> None:
+        return report(self.url, self.findings)
+
+    def start(self, robots: "Sequence[ConfiguredRobot]" = ()) -> None:
         """Check the bridge, unless a check is running already.
 
         Args:
@@ -283,13 +286,15 @@ class Checkup:
         if self._seen is not None and self.can_try:
             self._begin(self._try(self._seen))
 
-    def _begin(self, work: Coroutine[None, None, BridgeFacts]) -> None:
+    def _begin(self, work: "Coroutine[None, None, BridgeFacts]") -> None:
         self._show_progress("Starting.")
         self._task = asyncio.get_running_loop().create_task(self._run(work))
 
-    async def _look(self, robots: Sequence[ConfiguredRobot]) -> BridgeFacts:
+    async def _look(self, robots: "Sequence[ConfiguredRobot]") -> "BridgeFacts":
+        from webmap.discovery.doctor.measure import observe
+
         try:
-            return await self._observe(
+            return await (self._observe or observe)(
                 self.url,
                 seconds=SECONDS,
                 configured=lambda _: robots,
@@ -298,11 +303,15 @@ class Checkup:
         finally:
             self.ended = time.monotonic()
 
-    async def _try(self, seen: BridgeFacts) -> BridgeFacts:
-        self._show_progress(TRYING)
-        return await self._tried(seen)
+    async def _try(self, seen: "BridgeFacts") -> "BridgeFacts":
+        from webmap.discovery.doctor.measure import TRYING, tried
 
-    async def _run(self, work: Coroutine[None, None, BridgeFacts]) -> None:
+        self._show_progress(TRYING)
+        return await (self._tried or tried)(seen)
+
+    async def _run(self, work: "Coroutine[None, None, BridgeFacts]") -> None:
+        from webmap.discovery.doctor import Finding, judge
+
         try:
             self._seen = await work
             self.findings = judge(self._seen)

@@ -5,6 +5,8 @@ import { capOf, speedOf } from "../../web/motion/status.js";
 import {
   button,
   html,
+  setAttribute,
+  setDisabled,
   setHidden,
   setText,
   stopButton,
@@ -100,7 +102,7 @@ export class Panel {
     const age = report?.age ?? delay;
     const cap = report ? capOf(report) + (stated ? "" : slowness(age)) : "";
     setText(this._cap, cap);
-    set(this._cap, "title", cap);
+    setAttribute(this._cap, "title", cap);
   }
 
   /** Fold the figures out or in, on a page where the panel is one line. */
@@ -125,7 +127,7 @@ export class Panel {
     const all = [...motions(report), ...timings(report, loop, moving)];
     for (const { name, kind, text, more = "", title = "" } of all) {
       const figure = this._figure(name, kind);
-      set(figure, "title", title);
+      setAttribute(figure, "title", title);
       const [value, rest] = figure.querySelectorAll("dd > span");
       setText(value, text);
       setText(rest, more);
@@ -166,7 +168,7 @@ export class Panel {
     if (act !== null) {
       setText(this._lease, act);
       // Begins with the button's text, for people who use speech control.
-      set(this._lease, "aria-label", `${act} of ${name}`);
+      setAttribute(this._lease, "aria-label", `${act} of ${name}`);
     }
     const stops = report === null ? [] : [stopKey(report)];
     this._reset.show(report !== null && isLatched(report), stops);
@@ -174,11 +176,11 @@ export class Panel {
     const known = report?.stop_time != null;
     this._tester.element.classList.toggle("known", known);
     setHidden(this._stick, stick === null);
-    set(this._stick, "aria-pressed", String(stick === true));
-    set(this.stop, "aria-label", name ? `STOP ${name}` : "STOP the selected robot");
+    setAttribute(this._stick, "aria-pressed", String(stick === true));
+    setAttribute(this.stop, "aria-label", name ? `STOP ${name}` : "STOP the selected robot");
     // Disabled only when there is nothing to stop, never because the state is unknown.
-    set(this.stop, "data-robot", name);
-    this.stop.disabled = report === null;
+    setAttribute(this.stop, "data-robot", name);
+    setDisabled(this.stop, report === null);
   }
 }
 
@@ -209,15 +211,6 @@ function mayTest(report) {
 /** @param {number | null} delay */
 function slowness(delay) {
   return delay !== null && delay >= SLOW ? `. Slow connection: ${Math.round(delay)} ms` : "";
-}
-
-/**
- * @param {Element} element
- * @param {string} name
- * @param {string} value
- */
-function set(element, name, value) {
-  if (element.getAttribute(name) !== value) element.setAttribute(name, value);
 }
 
 /**

@@ -1,6 +1,14 @@
 import { SPACING } from "../../web/constants.js";
 import { chosen, poseOf, PressAim } from "../../web/tools/aim.js";
-import { button, html, setHidden, setText } from "../../web/tools/elements.js";
+import {
+  button,
+  html,
+  onBeat,
+  setAttribute,
+  setDisabled,
+  setHidden,
+  setText,
+} from "../../web/tools/elements.js";
 import { GoalMarks } from "./goal_marks.js";
 import { look, sendGoal, ShownGoals } from "../../web/tools/goals.js";
 import { lay } from "../../web/tools/overlay.js";
@@ -95,13 +103,12 @@ class GoalTool {
       this._drive.on("refused", ({ robot, what, why }) => this._refused(robot, what, why)),
     ];
     // Removes the marks of ended goals, and adds marks when the scene arrives.
-    this._timer = setInterval(() => this._show(), 250);
+    this._offs.push(onBeat(() => this._show()));
     for (const { robot, goal } of this._drive.robots.values()) this._hear(robot, goal);
     this._show();
   }
 
   destroy() {
-    clearInterval(this._timer);
     this._aim.destroy();
     this._marks.destroy();
     this._marking.destroy();
@@ -280,10 +287,10 @@ class GoalTool {
   _show() {
     const robots = chosen(this._map);
     const way = robots.some((robot) => this._drive.robots.get(robot)?.method !== null);
-    this._go.disabled = robots.length === 0 || !way;
+    setDisabled(this._go, robots.length === 0 || !way);
     const words = robots.length > 1 ? `Send goal to ${robots.length} robots` : "Send goal";
     setText(/** @type {Element} */ (this._go.lastElementChild), words);
-    this._go.setAttribute("aria-pressed", String(this._aim.active));
+    setAttribute(this._go, "aria-pressed", String(this._aim.active));
     setHidden(this._apart, robots.length < 2);
     setHidden(this._cancel, !robots.some((robot) => this._mayCancel(robot)));
     this._draw(robots);

@@ -1,4 +1,4 @@
-import { html, setHidden, setText, svg } from "../../web/tools/elements.js";
+import { html, onBeat, setHidden, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 import { foldedTool } from "../../web/tools/tool.js";
 
@@ -21,8 +21,8 @@ import { foldedTool } from "../../web/tools/tool.js";
 /** The key of the choice in this browser's storage. */
 const KEPT = "webmap.rosout";
 
-/** Milliseconds between two updates of the ages. */
-const PERIOD = 1000;
+/** Beats between two updates of the ages. */
+const PERIOD = 4;
 
 /** The name of a level for people, its outline, filled, and the symbol drawn on it. */
 const LOOKS = /** @type {Record<string, [string, string, string]>} */ ({
@@ -104,14 +104,14 @@ class RosoutPanel {
     this._details.querySelector("summary")?.append(this._badge);
     this._details.open = open;
     this._details.addEventListener("toggle", () => this._toggled());
-    this._timer = setInterval(() => this._age(), PERIOD);
+    this._off = onBeat(() => this._age(), PERIOD);
     this._take = lay(map, this._details, "top-left");
     this._filter();
     if (open) send({ open: true });
   }
 
   destroy() {
-    clearInterval(this._timer);
+    this._off();
     this._leave();
     this._take();
   }

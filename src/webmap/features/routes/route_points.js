@@ -1,6 +1,6 @@
 import { LONGEST_NAME } from "../../web/constants.js";
 import { onScreen } from "../../web/tools/aim.js";
-import { button, html, setHidden, setText, svg } from "../../web/tools/elements.js";
+import { button, html, setAttribute, setHidden, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -97,7 +97,7 @@ export class RoutePoints {
       element.firstElementChild?.setAttribute("transform", `rotate(${degrees})`);
     }
     const line = this._loop && places.length > 2 ? [...places, places[0]] : places;
-    this._line.setAttribute("points", line.map(({ x, y }) => `${x},${y}`).join(" "));
+    setAttribute(this._line, "points", line.map(({ x, y }) => `${x},${y}`).join(" "));
   }
 }
 

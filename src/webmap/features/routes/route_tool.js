@@ -1,6 +1,14 @@
 import { MOST_POINTS } from "../../web/constants.js";
 import { poseOf, PressAim } from "../../web/tools/aim.js";
-import { button, html, setHidden, setText } from "../../web/tools/elements.js";
+import {
+  button,
+  html,
+  onBeat,
+  setAttribute,
+  setDisabled,
+  setHidden,
+  setText,
+} from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 import { foldedTool } from "../../web/tools/tool.js";
 import { RouteArea } from "./route_area.js";
@@ -126,16 +134,15 @@ class RouteTool {
     this._offs = [
       lay(map, this._details, "top-left"),
       map.onSelect(() => this._show()),
+      onBeat(() => {
+        this._robots.look();
+        this._show();
+      }),
     ];
-    this._timer = setInterval(() => {
-      this._robots.look();
-      this._show();
-    }, 250);
     this._show();
   }
 
   destroy() {
-    clearInterval(this._timer);
     const [points, loop, open] = [this._points, this._loops, this._details.open];
     const runs = this._robots.destroy();
     storeRoute(this._map.id, { points, loop, open, runs }, performance.now());
@@ -227,24 +234,25 @@ class RouteTool {
     const live = run?.live === true;
     const report = this._drive.robots.get(this._map.selected ?? "");
     const open = this._details.open;
-    this._edit.setAttribute("aria-pressed", String(this._aim.active));
+    setAttribute(this._edit, "aria-pressed", String(this._aim.active));
     setText(this._edit, this._aim.active ? "Done" : "Add points");
     // Leaves a part of the map free to press on, also on a phone.
     const adding = this._aim.active || this._aim.waits || this._area.draws;
     this._details.classList.toggle("adding", adding);
     this._details.classList.toggle("area", this._area.active);
     this._area.look();
-    this._loop.setAttribute("aria-pressed", String(this._loops));
-    this._here.disabled = this._robotPose() === null;
-    this._clear.disabled = this._points.length === 0;
-    this._run.disabled = this._points.length === 0 || !report?.method || busy;
+    setAttribute(this._loop, "aria-pressed", String(this._loops));
+    setDisabled(this._here, this._robotPose() === null);
+    setDisabled(this._clear, this._points.length === 0);
+    setDisabled(this._run, this._points.length === 0 || !report?.method || busy);
     setText(this._run, live ? "Run again" : "Start route");
     for (const each of [this._pause, this._skip, this._end]) setHidden(each, !live);
-    for (const each of [this._pause, this._skip]) each.disabled = busy;
+    for (const each of [this._pause, this._skip]) setDisabled(each, busy);
     setText(this._pause, run?.state === "going" ? "Pause" : "Resume");
     setText(this._message, this._text(run, report?.name ?? ""));
     const refused = this._area.refused ? "refused" : "";
-    this._message.dataset.state = this._area.active ? refused : (run?.state ?? "");
+    const state = this._area.active ? refused : (run?.state ?? "");
+    setAttribute(this._message, "data-state", state);
     this._showList();
     const points = this._aimed ? [...this._points, this._aimed] : this._points;
     const shown = open ? points : live ? run.points : [];

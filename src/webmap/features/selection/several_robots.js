@@ -1,5 +1,13 @@
 import { chosen, poseOf } from "../../web/tools/aim.js";
-import { button, html, setHidden, setText, stopButton, svg } from "../../web/tools/elements.js";
+import {
+  button,
+  html,
+  onBeat,
+  setHidden,
+  setText,
+  stopButton,
+  svg,
+} from "../../web/tools/elements.js";
 import { lay, ownPlace } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -14,8 +22,6 @@ import { lay, ownPlace } from "../../web/tools/overlay.js";
  * @property {string} [button] A selector of the page's button.
  */
 
-/** Milliseconds between two updates of the buttons. */
-const PERIOD = 250;
 
 /** A drag shorter than this in pixels is a click. */
 const DRAG_FROM = 4;
@@ -81,13 +87,13 @@ class SeveralBar {
       send({ mark: robots.filter((robot) => robot !== null) });
     };
     ownPlace(own)?.addEventListener("click", act, { signal: this._ending.signal });
-    this._timer = setInterval(() => this._show(), PERIOD);
+    this._off = onBeat(() => this._show());
     this._off = map.onSelect(() => this.showProblem(""));
     this._show();
   }
 
   destroy() {
-    clearInterval(this._timer);
+    this._off();
     this._ending.abort();
     this._off();
     this._take();

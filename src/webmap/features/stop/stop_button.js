@@ -5,6 +5,7 @@ import { Obedience, standingStops } from "../../web/motion/stops.js";
 import {
   button,
   html,
+  inOrder,
   setHidden,
   setText,
   stopButton,
@@ -189,7 +190,7 @@ class Stop {
  * @param {Verdict} other
  */
 function byName(one, other) {
-  return one.name.localeCompare(other.name, undefined, { numeric: true });
+  return inOrder(one.name, other.name);
 }
 
 /** Covers the page: a robot does not follow its commands, or perhaps gets none. */
@@ -240,8 +241,9 @@ class Alarm {
     setText(this._names, news.map(([, words]) => words).join(", "));
     const silent = news.every(([, words]) => words.includes(MAY_MOVE));
     setText(this._title, silent ? "ROBOT MAY STILL BE MOVING" : "ROBOT NOT OBEYING");
-    if (news.length === 0) this.destroy();
-    else {
+    if (news.length === 0) {
+      if (this._element.isConnected) this.destroy();
+    } else {
       if (!this._element.isConnected) this._begin();
       this._place();
     }

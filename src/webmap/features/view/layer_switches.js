@@ -1,4 +1,4 @@
-import { html, setHidden, setText } from "../../web/tools/elements.js";
+import { html, inOrder, onBeat, setHidden, setText } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 import { foldedTool } from "../../web/tools/tool.js";
 
@@ -14,11 +14,8 @@ const OF = "\n";
 /** Greatest number of listed drawings of a layer; others are only switched together. */
 const MOST = 16;
 
-/** Milliseconds between two updates of an open list. */
-const PERIOD = 1000;
-
-/** Sorts the layers of robot_2 before those of robot_10. */
-const order = new Intl.Collator("en", { numeric: true });
+/** Beats between two updates of an open list. */
+const PERIOD = 4;
 
 let maps = 0;
 
@@ -64,7 +61,7 @@ export function hidingRules(layers, shown, scope) {
 export function drawingNames(drawings) {
   const found = new Set();
   for (const { dataset } of drawings) if (dataset.layer) found.add(dataset.layer);
-  const names = [...found].sort(order.compare);
+  const names = [...found].sort(inOrder);
   return names.length > 1 ? names : [];
 }
 
@@ -89,7 +86,7 @@ class LayerSwitches {
     const content = [this._list, this._none];
     this._details = foldedTool("webmap-layers", "layers", "Layers", menu, ...content);
     this._details.addEventListener("toggle", () => this._look());
-    this._timer = setInterval(() => this._look(), PERIOD);
+    this._off = onBeat(() => this._look(), PERIOD);
     // A page that finds things by name needs the list while it is closed too.
     this._ending = new AbortController();
     const { signal } = this._ending;
@@ -109,7 +106,7 @@ class LayerSwitches {
   }
 
   destroy() {
-    clearInterval(this._timer);
+    this._off();
     this._ending.abort();
     this._leave();
     this._take();
@@ -177,7 +174,7 @@ class LayerSwitches {
   _arrange() {
     const rows = this._layers.flatMap(([name]) => {
       const keys = [...this._rows.keys()].filter((key) => key.split(OF)[0] === name);
-      const found = keys.sort(order.compare).map((key) => this._rows.get(key));
+      const found = keys.sort(inOrder).map((key) => this._rows.get(key));
       return [...found, this._notes.get(name)].filter((row) => row !== undefined);
     });
     this._list.replaceChildren(...rows);

@@ -152,13 +152,6 @@ def free_way(
     return min(times, default=math.inf)
 
 
-def polygon_around(radius: float, corners: int = 12) -> tuple[Point, ...]:
-    """Return the corners of a regular polygon around a disc, in order."""
-    outer = radius / math.cos(math.pi / corners)
-    turns = (math.tau * corner / corners for corner in range(corners))
-    return tuple((outer * math.cos(turn), outer * math.sin(turn)) for turn in turns)
-
-
 def inside(corners: Sequence[Point], point: Point) -> bool:
     """Return whether a point lies within a polygon."""
     x, y = point
