@@ -29,8 +29,8 @@ from webmap.testing import WitnessRobot
 POSES = 100
 KEYS = 25
 
-TICK = 0.05
-"""Seconds between two frames of the display."""
+PAUSE = 0.06
+"""The least time between two poses, in seconds."""
 
 FIRST = 20.0
 """x of the first pose, in metres; each next pose is one centimetre farther."""
@@ -93,7 +93,7 @@ def poses(page: Page, robot: WitnessRobot, marks: Marks) -> list[float]:
     marks.found.clear()
     sent = {}
     for number in range(POSES):
-        time.sleep(TICK + random.uniform(0.01, 0.06))
+        time.sleep(PAUSE + random.uniform(0.0, 0.05))
         sent[number] = time.monotonic()
         robot.publish(robot.ODOMETRY_TOPIC, pose(FIRST + number / 100))
     time.sleep(0.5)
@@ -144,15 +144,13 @@ Measure = Callable[[Page, WitnessRobot, Marks], list[float]]
 
 
 @contextmanager
-def relayed(bridge: str, period: float = 0.0) -> Iterator[str]:
+def relayed(bridge: str) -> Iterator[str]:
     """Run a relay to a rosbridge or to another relay; yield the address of its page."""
-    with module("benchmarks.relay", bridge, period) as (url, _):
+    with module("benchmarks.relay", bridge) as (url, _):
         yield url
 
 
-def bare(
-    measure: Measure, period: float = 0.0, relays: int = 1
-) -> Callable[[], Figures]:
+def bare(measure: Measure, relays: int = 1) -> Callable[[], Figures]:
     """Return a run of bare relays in a row."""
 
     def run() -> Figures:
@@ -160,7 +158,7 @@ def bare(
             robot = running.enter_context(Robot())
             bridge = robot.url
             for _ in range(relays):
-                url = running.enter_context(relayed(bridge, period))
+                url = running.enter_context(relayed(bridge))
                 bridge = socket_of(url)
             return measured(url, robot, measure)
 
@@ -201,10 +199,8 @@ def measured(url: str, robot: WitnessRobot, measure: Measure) -> Figures:
 
 def bench(rounds: int, quick: bool = False) -> list[Comparison]:
     """Compare both directions with a bare relay."""
-    name = f"bare relay, a pose every {1000 * TICK:.0f} ms"
     shown = [
         Contender("bare relay", bare(poses)),
-        Contender(name, bare(poses, TICK)),
         Contender("WebMap", webmap(poses)),
     ]
     driven = [

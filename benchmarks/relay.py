@@ -1,8 +1,7 @@
 """A bare server between a rosbridge and a browser, which forwards the messages.
 
-Run as ``python -m benchmarks.relay ROSBRIDGE PERIOD``; prints the address of a page.
-The page draws a robot at the poses of its odometry, and sends a velocity for each key.
-It forwards each pose at once, or only the newest pose in each period of PERIOD seconds.
+Run as ``python -m benchmarks.relay ROSBRIDGE``; prints the address of a page. The page
+draws a robot at the poses of its odometry, and sends a velocity for each key.
 """
 
 import asyncio
@@ -49,37 +48,19 @@ def page(connection: ServerConnection, request: Request) -> Response | None:
     return response
 
 
-async def pass_on(
-    source: ClientConnection, target: ServerConnection, period: float
-) -> None:
+async def pass_on(source: ClientConnection, target: ServerConnection) -> None:
     """Forward the poses."""
-    newest: list[str | bytes] = []
-
-    async def tick() -> None:
-        while True:
-            await asyncio.sleep(period)
-            if newest:
-                await target.send(newest.pop(), text=True)
-
-    ticking = asyncio.create_task(tick()) if period else None
-    try:
-        async for frame in source:
-            if ticking:
-                newest[:] = [frame]
-            else:
-                await target.send(frame, text=True)
-    finally:
-        if ticking:
-            ticking.cancel()
+    async for frame in source:
+        await target.send(frame, text=True)
 
 
-async def main(url: str, period: float) -> None:
+async def main(url: str) -> None:
     """Serve until killed."""
 
     async def handle(browser: ServerConnection) -> None:
         async with connect(url, compression=None, ping_interval=None) as robot:
             await robot.send(ops.subscribe(ODOMETRY, id="1"), text=True)
-            task = asyncio.create_task(pass_on(robot, browser, period))
+            task = asyncio.create_task(pass_on(robot, browser))
             async for frame in browser:
                 await robot.send(frame)
             task.cancel()
@@ -93,4 +74,4 @@ async def main(url: str, period: float) -> None:
 
 
 if __name__ == "__main__":
-    asyncio.run(main(sys.argv[1], float(sys.argv[2])))
+    asyncio.run(main(sys.argv[1]))
