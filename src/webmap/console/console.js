@@ -2,15 +2,7 @@ import { listenToActions, listenToPanel } from "./side_panel.js";
 import { listenToPalette } from "./palette.js";
 import { listenToRobots } from "./robot_list.js";
 import { markRobots } from "./robot_marks.js";
-import {
-  byId,
-  listenToSheet,
-  nameSheet,
-  onBeat,
-  setAttribute,
-  setText,
-  typing,
-} from "../web/tools/elements.js";
+import { byId, listenToSheet, nameSheet, onBeat, setText, typing } from "../web/tools/elements.js";
 import { keepInView, keepSizes, listenToList, listenToTools } from "./view_tools.js";
 
 /**
@@ -65,7 +57,7 @@ export default function attach(map, options, send) {
 function showConnection(drive) {
   const link = byId("link");
   const show = () => {
-    setAttribute(link, "data-link", drive.state);
+    if (link.dataset.link !== drive.state) link.dataset.link = drive.state;
   };
   /** @type {Map<string, boolean>} */
   const known = new Map();

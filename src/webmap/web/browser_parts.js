@@ -1,11 +1,5 @@
 import { OWN_FILES, resolve } from "./access.js";
-import {
-  FIRST_PARTS,
-  FIRST_SHEETS,
-  PARTS,
-  PART_FOLDERS,
-  PART_SHEETS,
-} from "./constants.js";
+import { FIRST_PARTS, FIRST_SHEETS, PARTS, PART_FOLDERS, PART_SHEETS } from "./constants.js";
 
 /** @typedef {import('./map.js').MapCanvas} MapCanvas */
 

@@ -6,7 +6,6 @@ import {
   button,
   html,
   setAttribute,
-  setDisabled,
   setHidden,
   setText,
   stopButton,
@@ -180,7 +179,7 @@ export class Panel {
     setAttribute(this.stop, "aria-label", name ? `STOP ${name}` : "STOP the selected robot");
     // Disabled only when there is nothing to stop, never because the state is unknown.
     setAttribute(this.stop, "data-robot", name);
-    setDisabled(this.stop, report === null);
+    this.stop.toggleAttribute("disabled", report === null);
   }
 }
 

@@ -1,14 +1,6 @@
 import { SPACING } from "../../web/constants.js";
 import { chosen, poseOf, PressAim } from "../../web/tools/aim.js";
-import {
-  button,
-  html,
-  onBeat,
-  setAttribute,
-  setDisabled,
-  setHidden,
-  setText,
-} from "../../web/tools/elements.js";
+import { button, html, onBeat, setAttribute, setHidden, setText } from "../../web/tools/elements.js";
 import { GoalMarks } from "./goal_marks.js";
 import { look, sendGoal, ShownGoals } from "../../web/tools/goals.js";
 import { lay } from "../../web/tools/overlay.js";
@@ -287,7 +279,7 @@ class GoalTool {
   _show() {
     const robots = chosen(this._map);
     const way = robots.some((robot) => this._drive.robots.get(robot)?.method !== null);
-    setDisabled(this._go, robots.length === 0 || !way);
+    this._go.toggleAttribute("disabled", robots.length === 0 || !way);
     const words = robots.length > 1 ? `Send goal to ${robots.length} robots` : "Send goal";
     setText(/** @type {Element} */ (this._go.lastElementChild), words);
     setAttribute(this._go, "aria-pressed", String(this._aim.active));

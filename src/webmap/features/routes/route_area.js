@@ -1,7 +1,7 @@
 import { devicesOf } from "../../web/inputs/devices.js";
 import { attentive } from "../../web/inputs/focus.js";
 import { apply } from "../../web/view.js";
-import { button, html, setDisabled, setHidden, svg } from "../../web/tools/elements.js";
+import { button, html, setHidden, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 import { MOST_CORNERS, problemOf, withoutRepetitions } from "./polygon.js";
 import { PressAim } from "../../web/tools/aim.js";
@@ -342,7 +342,7 @@ class AreaPanel {
 
   /** @param {boolean} possible Whether the robot's position can be added. */
   showHere(possible) {
-    setDisabled(this._here, !possible);
+    this._here.toggleAttribute("disabled", !possible);
   }
 
   /** Whether one of the area's buttons has the focus. */

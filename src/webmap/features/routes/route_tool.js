@@ -1,14 +1,6 @@
 import { MOST_POINTS } from "../../web/constants.js";
 import { poseOf, PressAim } from "../../web/tools/aim.js";
-import {
-  button,
-  html,
-  onBeat,
-  setAttribute,
-  setDisabled,
-  setHidden,
-  setText,
-} from "../../web/tools/elements.js";
+import { button, html, onBeat, setAttribute, setHidden, setText } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 import { foldedTool } from "../../web/tools/tool.js";
 import { RouteArea } from "./route_area.js";
@@ -242,12 +234,13 @@ class RouteTool {
     this._details.classList.toggle("area", this._area.active);
     this._area.look();
     setAttribute(this._loop, "aria-pressed", String(this._loops));
-    setDisabled(this._here, this._robotPose() === null);
-    setDisabled(this._clear, this._points.length === 0);
-    setDisabled(this._run, this._points.length === 0 || !report?.method || busy);
+    this._here.toggleAttribute("disabled", this._robotPose() === null);
+    this._clear.toggleAttribute("disabled", this._points.length === 0);
+    const cannot = this._points.length === 0 || !report?.method || busy;
+    this._run.toggleAttribute("disabled", cannot);
     setText(this._run, live ? "Run again" : "Start route");
     for (const each of [this._pause, this._skip, this._end]) setHidden(each, !live);
-    for (const each of [this._pause, this._skip]) setDisabled(each, busy);
+    for (const each of [this._pause, this._skip]) each.toggleAttribute("disabled", busy);
     setText(this._pause, run?.state === "going" ? "Pause" : "Resume");
     setText(this._message, this._text(run, report?.name ?? ""));
     const refused = this._area.refused ? "refused" : "";

@@ -119,17 +119,8 @@ export function setHidden(element, hidden) {
 }
 
 /**
- * Enable or disable an element, only if that differs, as {@link setHidden}.
- *
- * @param {HTMLButtonElement} element
- * @param {boolean} disabled
- */
-export function setDisabled(element, disabled) {
-  if (element.disabled !== disabled) element.disabled = disabled;
-}
-
-/**
- * Set an attribute only if it differs, as {@link setHidden}.
+ * Set an attribute only if it differs, as {@link setHidden}. `toggleAttribute()` writes
+ * only a difference, too.
  *
  * @param {Element} element
  * @param {string} name
