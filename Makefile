@@ -137,7 +137,7 @@ test-motion: $(DEV) $(NODE)
 test-load: $(DEV) $(NODE)
 	$(BIN)/pytest -q $(TO_RESULTS) -m serial $(ALONE)
 test-time: $(DEV) $(NODE)
-	$(PY) tools/pytest_beside.py 2 $(TO_RESULTS) -m "serial$(PICKED)" $(OF_TIME)
+	$(PY) tools/pytest_beside.py 3 $(TO_RESULTS) -m "serial$(PICKED)" $(OF_TIME)
 
 ## test-safety: long tests of the motion guarantees, and the table of figures (TRIALS=20, RESUME=1, LANES=2)
 .PHONY: test-safety

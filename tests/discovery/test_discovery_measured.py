@@ -13,7 +13,8 @@ from webmap.discovery.doctor.measure import observe, tried
 from webmap.discovery.doctor.samples import ENOUGH
 from webmap.ros.rosbridge.checks import LinkFacts, look
 
-pytestmark = pytest.mark.slow
+# Rates and ages are measured.
+pytestmark = [pytest.mark.slow, pytest.mark.serial]
 
 SECONDS = 0.4
 LONG = 2.0
@@ -46,7 +47,6 @@ def level_of(findings, words):
     return found.level
 
 
-@pytest.mark.serial  # rates and ages are measured
 @DIALECTS
 def test_a_good_robot_has_no_warnings_and_the_check_publishes_nothing(dialect):
     progress = []
@@ -144,7 +144,6 @@ def test_another_node_that_publishes_velocities_is_named(dialect):
     )
 
 
-@pytest.mark.serial  # rates and ages are measured
 @DIALECTS
 @pytest.mark.parametrize(
     ("ahead", "words"),
@@ -317,7 +316,6 @@ TOPICS = {
 }
 
 
-@pytest.mark.serial  # rates and ages are measured
 @DIALECTS
 def test_without_rosapi_a_given_topic_list_is_used(dialect):
     _, findings, seen = looked_at(

@@ -14,7 +14,8 @@ from webmap.base.geometry import Twist
 from webmap.gate import protocol
 from webmap.gate.display.client import GateClient
 
-pytestmark = pytest.mark.slow
+# A gate drives in real time, and waits for most of it.
+pytestmark = [pytest.mark.slow, pytest.mark.serial]
 
 JITTER = 0.15
 """Seconds that the computer that runs the tests may add to a limit."""
@@ -67,7 +68,6 @@ class TestPages:
         others = {t.topic for t in fake.received if t.link == velocity_link}
         assert others == {"/cmd_vel"}, "velocity has a socket of its own"
 
-    @pytest.mark.serial
     def test_released_inputs_send_zeros_for_half_a_second_and_then_nothing(
         self, page, fake
     ):
@@ -82,7 +82,6 @@ class TestPages:
         time.sleep(0.3)
         assert fake.velocities[-1][0] == zeros[-1]
 
-    @pytest.mark.serial
     def test_zero_is_sent_within_250_ms_when_a_page_sends_no_more_commands(
         self, page, fake
     ):
@@ -92,7 +91,6 @@ class TestPages:
         zero = eventually(lambda: first_zero_after(fake, at), "a zero")
         assert zero - fake.moving[-1][0] <= 0.25 + JITTER
 
-    @pytest.mark.serial
     def test_closing_the_page_sends_zero_at_once(self, page, fake):
         page.drive_off(fake)
         at = time.monotonic()
@@ -100,7 +98,6 @@ class TestPages:
         zero = eventually(lambda: first_zero_after(fake, at), "a zero")
         assert zero - at <= 0.1 + JITTER
 
-    @pytest.mark.serial
     def test_stop_by_a_viewer_sends_zero_at_once_and_blocks_motion(
         self, page, client, fake
     ):
@@ -326,7 +323,6 @@ class TestProgram:
 
         return eventually(attempt, "the lease")
 
-    @pytest.mark.serial
     def test_a_program_drives_within_the_limits_and_receives_reports(
         self, client, robot_spec, fake, reports
     ):
@@ -482,7 +478,6 @@ class TestLifecycle:
         with pytest.raises(NoLease, match="the gate has ended"):
             future.result(10)
 
-    @pytest.mark.serial
     def test_ending_the_gate_sends_zero_to_a_driven_robot_within_100_ms(
         self, client, page, fake
     ):
@@ -495,7 +490,6 @@ class TestLifecycle:
         assert zero - at < 0.1 + JITTER
         assert fake.moving[-1][0] < zero
 
-    @pytest.mark.serial
     def test_a_missing_heartbeat_of_the_display_sends_zero_within_300_ms(
         self, client, page, fake
     ):
@@ -508,7 +502,6 @@ class TestLifecycle:
         time.sleep(0.3)
         assert len(fake.moving) == moves
 
-    @pytest.mark.serial
     @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
     def test_a_signal_to_the_gate_sends_zero_and_ends_the_gate(
         self, client, page, fake, number, reports
@@ -683,7 +676,6 @@ class TestInputs:
         eventually(lambda: other.robot().get("mine"), "the lease")
         other.end()
 
-    @pytest.mark.serial
     def test_a_stop_test_measures_the_command_timeout_and_keeps_the_result(
         self, client, robot_spec, fake
     ):
