@@ -98,8 +98,15 @@ def test_frames_come_less_often_when_they_cost_more():
     assert pace.due(5.0) == pytest.approx(100.2)
     pace.made(200.0, took=0.0198, number=1)
     assert pace.due(60.0) == pytest.approx(200.05)
-    pace.made(300.0, took=0.0, number=100)
-    assert pace.due(60.0) == pytest.approx(300.05)
+    for number, period in (
+        (8, 1 / 60),
+        (20, 0.04),
+        (50, 0.05),
+        (100, 0.05),
+        (200, 0.1),
+    ):
+        pace.made(300.0, took=0.0, number=number)
+        assert pace.due(60.0) == pytest.approx(300.0 + period)
 
 
 def test_a_full_collection_does_not_look_at_the_objects_of_open_pages(loop):

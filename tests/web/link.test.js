@@ -136,13 +136,13 @@ test("a link replaces a first socket that has closed", (t) => {
   assert.equal(Hanging.made.length, 1);
 });
 
-test("a page answers at once while drawing is cheap, and draws half of the time else", () => {
+test("a page answers at once while drawing is cheap, and later the more it costs", () => {
   const pace = new AnswerPace();
   assert.equal(pace.pause, 0);
-  for (let frame = 0; frame < 30; frame += 1) pace.drawn(6);
-  assert.equal(pace.pause, 0);
-  for (let frame = 0; frame < 30; frame += 1) pace.drawn(25);
-  assert.ok(Math.abs(pace.pause - 25) < 0.1);
+  for (const [cost, pause] of [[3, 0], [6, 18], [12.5, 37.5], [25, 25], [40, 40]]) {
+    for (let frame = 0; frame < 60; frame += 1) pace.drawn(cost);
+    assert.ok(Math.abs(pace.pause - pause) < 0.1, `${cost}: ${pace.pause}`);
+  }
   pace.drawn(60_000); // the page was not shown meanwhile
-  assert.ok(pace.pause < 45);
+  assert.ok(pace.pause < 60);
 });

@@ -15,6 +15,10 @@ SENDING = 0.0002
 SHARE = 0.4
 """The part of a core that poses and frames may take; then frames come less often."""
 
+EACH, SLOW = 0.002, 0.05
+"""Seconds between frames for each page, up to the time of 25 pages: all pages together
+get at most 500 frames a second while there are fewer."""
+
 
 class FramePace:
     """Decides when frames are made: at once after a change, then at a rate.
@@ -27,7 +31,7 @@ class FramePace:
 
     def __init__(self) -> None:
         self._begun = -math.inf
-        self._cost = self._spent = self._period = 0.0
+        self._cost = self._spent = self._pause = self._period = 0.0
         self._waiting: dict[Callable[[], object], None] = {}
 
     def due(self, rate: float) -> float:
@@ -37,7 +41,8 @@ class FramePace:
             rate: Frames a second, at most.
 
         """
-        self._period = max(1.0 / rate, (self._cost + self._spent) / SHARE)
+        spent = self._cost + self._spent
+        self._period = max(1.0 / rate, self._pause, spent / SHARE)
         return self._begun + self._period
 
     def made(self, begun: float, took: float, number: int) -> None:
@@ -52,6 +57,7 @@ class FramePace:
         if number:
             self._begun = begun
             self._cost = took + number * SENDING
+            self._pause = min(number * EACH, SLOW)
             self._spent = 0.0
 
     def end(self) -> None:
