@@ -198,6 +198,7 @@ def test_no_static_transform_is_dropped_when_newer_messages_arrive():
     run(scenario)
 
 
+@pytest.mark.serial  # the delay is measured
 def test_many_large_messages_of_one_bridge_do_not_delay_another_bridge():
     """Many topics of one bridge wait, and then a message of another bridge arrives."""
 
