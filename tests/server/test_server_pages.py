@@ -109,6 +109,19 @@ def test_frames_come_less_often_when_they_cost_more():
         assert pace.due(60.0) == pytest.approx(300.0 + period)
 
 
+def test_poses_while_nobody_looks_do_not_delay_the_frames_of_the_next_page():
+    pace = FramePace()
+    now = time.monotonic()
+    for _ in range(3):
+        pace.process(-math.inf, now - 10.0, lambda: None)
+    pace.made(now, took=0.0, number=1)
+    assert pace.due(60.0) == pytest.approx(now + 1 / 60)
+    pace.process(-math.inf, now - 10.0, lambda: None)  # it took ten seconds
+    assert pace.due(60.0) == pytest.approx(now + 1.0)
+    pace.end()
+    assert pace.due(60.0) == -math.inf
+
+
 def test_a_full_collection_does_not_look_at_the_objects_of_open_pages(loop):
     model = make_model(loop, lambda page: webmap.Map(page.element("map")))
     _, socket = open_page(model)

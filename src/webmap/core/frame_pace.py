@@ -15,6 +15,9 @@ SENDING = 0.0002
 SHARE = 0.4
 """The part of a core that poses and frames may take; then frames come less often."""
 
+LONGEST = 1.0
+"""The longest time between frames for that reason, in seconds."""
+
 EACH, SLOW = 0.002, 0.05
 """Seconds between frames for each page, up to the time of 25 pages: all pages together
 get at most 500 frames a second while there are fewer."""
@@ -41,8 +44,8 @@ class FramePace:
             rate: Frames a second, at most.
 
         """
-        spent = self._cost + self._spent
-        self._period = max(1.0 / rate, self._pause, spent / SHARE)
+        spent = min((self._cost + self._spent) / SHARE, LONGEST)
+        self._period = max(1.0 / rate, self._pause, spent)
         return self._begun + self._period
 
     def made(self, begun: float, took: float, number: int) -> None:
@@ -63,7 +66,7 @@ class FramePace:
     def end(self) -> None:
         """Set that nobody looks: process what waits, and let nothing wait."""
         self.prepare()
-        self._begun, self._period = -math.inf, 0.0
+        self._begun, self._spent, self._period = -math.inf, 0.0, 0.0
 
     def process(
         self, processed_at: float, now: float, fn: Callable[[], object]
@@ -81,7 +84,8 @@ class FramePace:
             frame_request.make()
         else:
             fn()
-            self._spent += time.monotonic() - now
+            if self._period:  # somebody looks
+                self._spent += time.monotonic() - now
 
     def prepare(self) -> None:
         """Process the poses that wait."""

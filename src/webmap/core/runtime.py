@@ -220,11 +220,13 @@ class Runtime:
             ready.set()
             await self._ending.wait()
         finally:
-            frame_request.listen(None)
-            if self._next_frames is not None:
-                self._next_frames.cancel()
             for fn in self._on_stop:
                 fn()
+            frame_request.listen(None)
+            frame_pace.end()
+            if self._next_frames is not None:
+                self._next_frames.cancel()
+                self._next_frames = None
             audience.end()
             RobotMotion.gate = None
             await asyncio.to_thread(gate.stop)
