@@ -29,8 +29,8 @@ ODOMETRY = "nav_msgs/Odometry"
 _NAMES = {view: name for name, view in ODOMETRY_VIEWS.items()}
 
 THROTTLES = ((6, 16), (13, 33), (20, 50), (1000, 100))
-"""The throttle, in milliseconds, of up to so many robots that name none: 60 poses a
-second of a few robots, and 10,000 of all together."""
+"""The throttle, in milliseconds, of up to so many robots without one of their own: 60
+poses a second of a few robots, and 10,000 of all together."""
 
 MOST = 200
 """The throttle of more robots, in milliseconds."""
@@ -40,7 +40,7 @@ FAR = 100
 
 
 class SharedThrottle:
-    """The throttle of all robots of this process that name none."""
+    """The throttle of all robots of this process that have none of their own."""
 
     def __init__(self) -> None:
         self.value = THROTTLES[0][1]
@@ -76,8 +76,8 @@ class OdometryFeed:
     Args:
         bridge: The connection to the ROS system that has the topic.
         topic: The topic.
-        throttle: The least time between two messages, in milliseconds; None for that of
-            all robots that name none, see :data:`THROTTLES`.
+        throttle: The least time between two messages, in milliseconds; None to use
+            that of :data:`THROTTLES`.
         type: The message type; if not given, the bridge is queried, and the fields of
             the first message are examined.
         listener: Called with each pose, in the model's thread.
