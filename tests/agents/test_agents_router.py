@@ -5,7 +5,12 @@ from pathlib import Path
 import pytest
 
 from webmap.agents import address
-from webmap.agents.router import access_rules, read_users, router_settings
+from webmap.agents.router import (
+    access_rules,
+    open_router,
+    read_users,
+    router_settings,
+)
 from webmap.base.errors import ConfigError
 from webmap.ros.names import is_agent_url, normalise_url
 
@@ -84,12 +89,21 @@ def test_an_agent_sends_as_itself_and_a_display_as_its_user(users):
     assert access_rules(read_users(users))["default_permission"] == "deny"
 
 
-def test_the_passwords_are_in_a_file_of_this_user_alone(users):
-    settings = router_settings("tcp/127.0.0.1:1", read_users(users))
+@pytest.mark.parametrize("port", [0, 1])
+def test_the_passwords_are_in_a_file_of_this_user_alone_until_zenoh_has_read_them(
+    users, port
+):
+    settings = router_settings(f"tcp/127.0.0.1:{port}", read_users(users))
     file = Path(settings["transport"]["auth"]["usrpwd"]["dictionary_file"])
     assert file.read_text() == "bay3:one\nwest:two\n"
     assert file.stat().st_mode & 0o077 == 0
-    file.unlink()
+    if port:
+        settings["listen"]["endpoints"] = ["tcp/256.0.0.1:1"]
+        with pytest.raises(ConfigError, match="cannot listen on"):
+            open_router(settings)
+    else:
+        open_router(settings).close()
+    assert not file.exists()
 
 
 @pytest.mark.parametrize(

@@ -10,13 +10,18 @@ import pytest
 from webmap.agents import address
 from webmap.agents.gate_messages import MOST_SAMPLE
 from webmap.agents.peer import Peer
-from webmap.agents.router import free_port, read_users, router_settings
-from webmap.agents.router_access import RouterUser, zenoh_config
+from webmap.agents.router import (
+    free_port,
+    open_router,
+    read_users,
+    router_settings,
+)
+from webmap.agents.router_access import RouterUser
 from webmap.base.errors import WireError
 
 pytestmark = pytest.mark.slow
 
-zenoh = pytest.importorskip("zenoh")
+pytest.importorskip("zenoh")
 
 TLS = Path(__file__).with_name("tls")
 
@@ -39,7 +44,7 @@ drives = ["bay3"]
 def router(listen="tcp/127.0.0.1:0", users=None, **options):
     """Run a router in this process; yield its locator."""
     settings = router_settings(listen, users, **options)
-    session = zenoh.open(zenoh_config(**settings))
+    session = open_router(settings)
     try:
         yield settings["listen"]["endpoints"][0]
     finally:

@@ -9,7 +9,7 @@ import socket
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -22,7 +22,11 @@ from webmap.agents.address import (
 )
 from webmap.agents.gate_messages import MOST_SAMPLE
 from webmap.agents.peer import MOST_BYTES
+from webmap.agents.router_access import zenoh_config
 from webmap.base.errors import ConfigError
+
+if TYPE_CHECKING:
+    import zenoh
 
 MOST_SESSIONS = 10_000
 """Sessions of a router; each agent and each display has three."""
@@ -149,6 +153,33 @@ def router_settings(
         transport["auth"] = {"usrpwd": {"dictionary_file": _dictionary(users)}}
         settings["access_control"] = access_rules(users)
     return settings
+
+
+def open_router(settings: dict[str, Any]) -> "zenoh.Session":
+    """Run a router in this process, until its session is closed.
+
+    Args:
+        settings: What :func:`router_settings` returned. The file with the passwords is
+            deleted as soon as Zenoh has read it.
+
+    Raises:
+        ConfigError: If Zenoh is not installed, or the router cannot listen.
+
+    """
+    passwords = settings["transport"].get("auth", {}).get("usrpwd")
+    try:
+        config = zenoh_config(**settings)
+        import zenoh
+
+        try:
+            return zenoh.open(config)
+        except zenoh.ZError as error:
+            (place,) = settings["listen"]["endpoints"]
+            text = str(error).partition(" at /")[0]
+            raise ConfigError(f"the router cannot listen on {place}: {text}") from None
+    finally:
+        if passwords is not None:
+            Path(passwords["dictionary_file"]).unlink()
 
 
 def _dictionary(users: Mapping[str, UserEntry]) -> str:

@@ -193,9 +193,7 @@ def router(
     from pathlib import Path
 
     from webmap.agents.address import url
-    from webmap.agents.router import read_users, router_settings
-    from webmap.agents.router_access import zenoh_config
-    from webmap.base.errors import ConfigError
+    from webmap.agents.router import open_router, read_users, router_settings
 
     known = None if users is None else read_users(Path(users))
     settings = router_settings(
@@ -205,14 +203,7 @@ def router(
         key=key or "",
         insecure_lan=insecure_lan,
     )
-    config = zenoh_config(**settings)
-    import zenoh
-
-    try:
-        session = zenoh.open(config)
-    except zenoh.ZError as error:
-        text = str(error).partition(" at /")[0]
-        raise ConfigError(f"the router cannot listen on {listen}: {text}") from None
+    session = open_router(settings)
     try:
         (place,) = settings["listen"]["endpoints"]
         echo(f"The router is ready at {url(place)}")
@@ -223,5 +214,3 @@ def router(
             threading.Event().wait()
     finally:
         session.close()  # type: ignore[no-untyped-call]
-        if known is not None:
-            Path(settings["transport"]["auth"]["usrpwd"]["dictionary_file"]).unlink()
