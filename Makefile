@@ -124,8 +124,9 @@ WITH_BROWSER := $(shell grep -rl --include='test_*.py' 'mark\.browser' tests | s
 test-browser: $(DEV) $(NODE)
 	$(PY) tools/pytest_beside.py $(JOBS) $(TO_RESULTS) -m "browser and not serial$(PICKED)" $(WITH_BROWSER)
 # Tests that measure time wait most of the time, so two files of them run in parallel on
-# any machine, the longest first; with three, robots are stopped because the page is late. Safety tests allow for the delays of the machine and do
-# not run again; the other tests run a second time if they fail. Tests under load run alone.
+# any machine, the longest first; with three, robots are stopped because the page is late.
+# Safety tests allow for the delays of the machine and do not run again; the other tests
+# run a second time if they fail. Tests under load run alone.
 ALONE := $(wildcard tests/safety/test_*_load.py tests/safety/test_*_soak.py)
 LONG = $(ONE_LANE) $(OTHER_LANE)
 OF_MOTION = $(LONG) $(filter-out $(LONG) $(ALONE),$(wildcard tests/safety/test_*.py))

@@ -6,7 +6,9 @@ import os
 import re
 import sys
 import tempfile
+from collections import Counter
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -48,10 +50,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_terminal_summary(
     terminalreporter: pytest.TerminalReporter, config: pytest.Config
 ) -> None:
-    """Write the outcome of each test, if the option asks for it."""
+    """Write the outcome and the time of each test, if the option asks for it."""
     file = config.getoption("results")
-    if file is None:
+    if file is None or hasattr(config, "workerinput"):  # a worker of pytest-xdist
         return
+    seconds = Counter[str]()
+    for report in chain(*terminalreporter.stats.values()):
+        if isinstance(report, pytest.TestReport):  # preparation, test, or clean-up
+            seconds[report.nodeid] += report.duration
     kinds = {"passed": "passed", "skipped": "skipped", "xfailed": "skipped"}
     kinds |= dict.fromkeys(("failed", "error", "xpassed"), "failed")
     with file.open("a", encoding="utf-8") as results:
@@ -59,7 +65,12 @@ def pytest_terminal_summary(
             for report in terminalreporter.stats.get(kind, []):
                 skipped = outcome == "skipped" and isinstance(report.longrepr, tuple)
                 why = report.longrepr[2].removeprefix("Skipped: ") if skipped else ""
-                line = {"test": report.nodeid, "outcome": outcome, "why": why}
+                line = {
+                    "test": report.nodeid,
+                    "outcome": outcome,
+                    "why": why,
+                    "seconds": round(seconds[report.nodeid], 2),
+                }
                 results.write(json.dumps(line) + "\n")
 
 

@@ -10,6 +10,7 @@ export default async function* results(events) {
     const outcome = type === "test:fail" ? "failed" : skipped ? "skipped" : "passed";
     const why = typeof data.skip === "string" ? data.skip : "";
     const test = `${relative(".", data.file ?? "")}::${data.name}`;
-    yield `${JSON.stringify({ test, outcome, why })}\n`;
+    const seconds = (data.details?.duration_ms ?? 0) / 1000;
+    yield `${JSON.stringify({ test, outcome, why, seconds })}\n`;
   }
 }

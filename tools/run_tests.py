@@ -19,6 +19,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from heapq import nlargest
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -54,6 +55,9 @@ AT_RISK = "Tests that measure whether a robot stops in time may fail here."
 SHOWN = 20
 """The number of failed tests, and of reasons for skipping, that the summary lists."""
 
+LONGEST = 10
+"""The number of the longest tests that the summary lists."""
+
 
 @dataclass
 class Part:
@@ -68,6 +72,7 @@ class Part:
         outcomes: The last outcome of each test, by its id.
         reasons: Why a test was skipped, by its id.
         again: The tests that failed first and passed when they ran again.
+        times: The time of each test with its fixtures, in seconds, by its id.
 
     """
 
@@ -79,6 +84,7 @@ class Part:
     outcomes: dict[str, str] = field(default_factory=dict)
     reasons: dict[str, str] = field(default_factory=dict)
     again: list[str] = field(default_factory=list)
+    times: dict[str, float] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -122,8 +128,9 @@ class Part:
             for line in self.results.read_text(encoding="utf-8").splitlines():
                 self.add(**json.loads(line))
 
-    def add(self, test: str, outcome: str, why: str) -> None:
+    def add(self, test: str, outcome: str, why: str, seconds: float = 0) -> None:
         """Record the outcome of a test; the outcome of a second run counts."""
+        self.times[test] = seconds
         if self.outcomes.get(test) == "failed" and outcome == "passed":
             self.again.append(test)
         self.outcomes[test] = outcome
@@ -203,6 +210,11 @@ def summary(parts: list[Part], seconds: float) -> str:
                 why for part in parts for why in part.reasons.values()
             ).most_common()
         ],
+    )
+    times = [(time, test) for part in parts for test, time in part.times.items()]
+    lines += _listed(
+        "The longest:",
+        [f"{time:5.1f} s  {test}" for time, test in nlargest(LONGEST, times)],
     )
     lines += _listed(
         "Failed at first and passed when they ran again, alone:",

@@ -17,7 +17,7 @@ from run_tests import Part, complaints, repeat, summary  # noqa: E402
 def part(name, *outcomes, status=0):
     made = Part(name, seconds=65.0, status=status)
     for test, outcome, *why in outcomes:
-        made.add(test, outcome, *(why or [""]))
+        made.add(test, outcome, *(why or [""]), seconds=len(made.outcomes))
     return made
 
 
@@ -63,6 +63,13 @@ def test_a_test_that_passes_when_it_runs_again_has_passed_and_is_listed():
     assert text.endswith("tests: 1 passed, 0 failed, 0 skipped")
 
 
+def test_the_longest_tests_are_listed_first_with_their_times():
+    parts = [part("test-time", *((f"t.py::{n}", "passed") for n in range(12)))]
+    longest = summary(parts, 1.0).partition("The longest:\n")[2].splitlines()
+    assert longest[:2] == ["   11.0 s  t.py::11", "   10.0 s  t.py::10"]
+    assert longest[10] == ""
+
+
 def test_a_test_in_node_is_repeated_by_its_name():
     expected = "node --test --test-name-pattern 'a b' tests/a.test.js"
     assert repeat("tests/a.test.js::a b") == expected
@@ -98,6 +105,8 @@ def test_pytest_writes_the_outcome_of_each_test(tmp_path):
         check=False,
     )
     lines = [json.loads(line) for line in results.read_text().splitlines()]
+    assert len(lines) == 4
+    assert all(line["seconds"] >= 0 for line in lines)
     found = {line["test"]: (line["outcome"], line["why"]) for line in lines}
     assert found == {
         "test_it.py::test_good": ("passed", ""),
@@ -127,6 +136,7 @@ def test_node_writes_the_outcome_of_each_test(tmp_path):
         check=False,
     )
     lines = [json.loads(line) for line in results.read_text().splitlines()]
+    assert all(line.pop("seconds") > 0 for line in lines)
     assert lines == [
         {"test": "a.test.js::good", "outcome": "passed", "why": ""},
         {"test": "a.test.js::bad", "outcome": "failed", "why": ""},
