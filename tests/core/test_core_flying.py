@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+# The gate flies the robot in real time.
+pytestmark = pytest.mark.serial
+
 PROGRAM = Path(__file__).with_name("program_that_climbs.py")
 
 
