@@ -14,6 +14,7 @@ import json
 import sys
 import threading
 
+from webmap.agents.address import agent_in
 from webmap.agents.gates import Gates
 from webmap.agents.link import AgentConnection
 from webmap.agents.peer import close_peers
@@ -42,7 +43,8 @@ def main(agent: str, pages: int) -> None:
         lane.start(asyncio.get_running_loop())
 
     try:
-        gates.declare(RobotSpec(id="looked-at", name="robot", bridge_url=agent))
+        robot = f"{agent_in(agent)}/looked-at"
+        gates.declare(RobotSpec(id=robot, name="robot", bridge_url=agent))
         for number in range(pages):
             gates.connect(f"viewer {number}", "operator", lambda _: None, print)
         thread.call(begin())

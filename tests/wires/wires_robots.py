@@ -261,14 +261,10 @@ def modules_of(robot):
 
     Of a module that was not added by name, only the class is known.
     """
-    named = iter(robot.module_arguments())
-    found = []
-    for module in robot.modules:
-        if id(module) in robot._made:
-            found.append(next(named))
-        else:
-            found.append((f"({type(module).__name__})", (), {}))
-    return found
+    return [
+        robot.arguments_of(module) or (f"({type(module).__name__})", (), {})
+        for module in list(robot.modules)  # another thread may add one meanwhile
+    ]
 
 
 def plain_data(robot):
