@@ -9,18 +9,16 @@ from webmap.scene.node import frame_request
 
 log = logging.getLogger("webmap")
 
-SENDING = 0.0002
-"""Processor time of the web thread for sending a small frame, in seconds."""
-
 SHARE = 0.4
-"""The part of a core that poses and frames may take; then frames come less often."""
+"""The part of a core that poses and the making of frames may take; then frames come
+less often."""
 
 LONGEST = 1.0
 """The longest time between frames for that reason, in seconds."""
 
-EACH, SLOW = 0.002, 0.05
-"""Seconds between frames for each page, up to the time of 25 pages: all pages together
-get at most 500 frames a second while there are fewer."""
+EACH, SLOW = 0.0025, 0.05
+"""Seconds between frames for each page, up to the time of 20 pages: all pages together
+get at most 400 frames a second while there are fewer."""
 
 
 class FramePace:
@@ -59,7 +57,7 @@ class FramePace:
         """
         if number:
             self._begun = begun
-            self._cost = took + number * SENDING
+            self._cost = took
             self._pause = min(number * EACH, SLOW)
             self._spent = 0.0
 
