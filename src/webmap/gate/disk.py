@@ -108,12 +108,7 @@ class Records:
         return next((press for press in found if press is not None), None)
 
     def changed(self, stamps: Mapping[Key, Stamp | None]) -> list[Key]:
-        """Return the machines whose STOP file may have another stamp, by one listing.
-
-        Args:
-            stamps: The stamp of each machine's file; ``None`` for a machine without.
-
-        """
+        """Return whose STOP file may have another stamp now, by one listing."""
         listed: dict[str, Stamp | None] = {}
         try:
             for path in self._folder.iterdir():

@@ -1,7 +1,6 @@
 """A lane: one socket to a bridge that is opened again when it ends."""
 
 import asyncio
-import contextlib
 import logging
 import math
 import random
@@ -268,9 +267,9 @@ class Lane:
             self._pinged(self._pings)
             self._socket.ping(self._pings.to_bytes(8, "big"))
             self._changed.clear()
-            with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(self.ping_period):
-                    await self._changed.wait()
+            alarm = loop.call_later(self.ping_period, self._changed.set)
+            await self._changed.wait()
+            alarm.cancel()
 
     def ping_every(self, period: float) -> None:
         """Ping every ``period`` seconds from now on; at once if that is more often."""
