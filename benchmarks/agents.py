@@ -100,7 +100,7 @@ class Operator:
                 self._acknowledged(message["ack"])
         elif message["op"] == "refused":
             self.refused.append(message["why"])
-        elif message["op"] == "robot":
+        elif message["op"] == "robot" and message["robot"] == self._robot:
             self._gate, self._epoch = message.get("gate", ""), message["epoch"]
             self._mine = self._epoch is not None
             if message["armable"]:

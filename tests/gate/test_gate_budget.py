@@ -145,3 +145,20 @@ class TestAttempts:
         attempts = ReconnectWaits()
         new = sum(attempts.is_new(f"trouble {n}") for n in range(1000))
         assert new == waits.MOST_TROUBLES
+
+
+def test_a_link_with_many_topics_may_send_more_frames_and_bytes():
+    def dropped(topics, frames, size):
+        budget = Budget()
+        budget.topics = topics
+        for each in range(3000):
+            at = 1000 + each / 1000
+            if budget.flood(at):
+                return True
+            if budget.wait(at) == 0:
+                budget.spend(frames // 1000, size // 1000, 0.00001, at)
+        return False
+
+    for frames, size in ((2 * limits.FRAMES, 0), (0, 2 * limits.BYTES)):
+        assert dropped(limits.TOPICS, frames, size)
+        assert not dropped(10 * limits.TOPICS, frames, size)

@@ -126,7 +126,7 @@ class TestLatch:
             lambda: (tmp_path / "large").rename(path),
         ):
             make()
-            assert records.may_be_stopped([KEY]) == {KEY}
+            assert records.changed({KEY: None}) == [KEY]
             press = records.latch_of(KEY)
             assert press.by == UNKNOWN
             assert records.stamp_of(KEY) is not None

@@ -1,10 +1,11 @@
 """Robots that are not driven cause almost no work in the gate: the work is counted."""
 
 import asyncio
+from pathlib import Path
 
 import pytest
 
-from equipment.gate_harness import URL, Bench, spec
+from equipment.gate_harness import KEY, URL, Bench, spec
 from webmap.base.geometry import Twist
 from webmap.gate import actions, events, protocol
 from webmap.gate.disk import Disk, Records, path_of
@@ -127,18 +128,34 @@ def test_odometry_of_a_stopped_robot_makes_no_report_of_other_stopped_robots(wor
 
     measure(0.1)
     done = work_of(work, lambda: measure(0.2))
-    assert done["reports"] == len(names)
-    bench.run(0.2)
+    assert done["reports"] == 0
+    done = work_of(work, lambda: bench.run(0.2))
+    assert done["reports"] <= 3 * len(names)
     assert [bench.report(name).measured[0] for name in names] == [0.2] * len(names)
 
 
 def test_a_stopped_robot_is_reported_at_the_rate_of_its_numbers(work):
+    bench = Bench().begin(spec(odometry_topic="/odom"))
+    bench.send("a", op="stop", robot="r1")
+    bench.run(3.0)
+
+    def move():
+        for number in range(100):
+            bench.handle(events.OdometryReceived(KEY, Twist(0.1 + number / 100)))
+            bench.run(0.01)
+
+    done = work_of(work, move)
+    assert 9 <= done["reports"] <= 11
+    assert len({report.measured for report in bench.of(protocol.RobotReport)}) >= 10
+
+
+def test_a_stopped_robot_whose_report_would_not_change_is_not_reported(work):
     bench = Bench().begin()
     bench.send("a", op="stop", robot="r1")
     bench.run(3.0)
     done = work_of(work, lambda: bench.run(1.0))
-    assert done["asked"] > 100
-    assert 9 <= done["reports"] <= 11
+    assert 18 <= done["asked"] <= 22, "a step, and whether it is active, for each zero"
+    assert done["reports"] == 0
 
 
 def test_a_verdict_on_a_stop_is_reported_in_the_step_that_finds_it():
@@ -226,17 +243,17 @@ def test_without_stops_no_file_is_looked_at(disk, looked):
     assert looked == []
 
 
-def test_only_the_files_that_exist_are_looked_at(disk, looked, tmp_path):
+def test_only_the_files_that_have_changed_are_looked_at(disk, looked, tmp_path):
     Records(tmp_path).keep_latch(KEYS[3], ANN, frozenset())
     assert checked(disk) == [StopFileChanged(KEYS[3], ANN)]
     assert checked(disk) == []
     Records(tmp_path).keep_latch(KEYS[3], BEN, frozenset())
     assert checked(disk) == [StopFileChanged(KEYS[3], BEN)]
-    assert looked == [KEYS[3]] * 3
+    assert looked == [KEYS[3]] * 2, "only those whose file has changed"
     path_of(tmp_path, KEYS[3], "stop").unlink()
     assert checked(disk) == [StopFileChanged(KEYS[3], None)]
     assert checked(disk) == []
-    assert looked == [KEYS[3]] * 4
+    assert looked == [KEYS[3]] * 3
 
 
 def test_a_stop_that_was_being_lifted_is_looked_at(disk, looked, tmp_path):
@@ -251,7 +268,7 @@ def test_a_file_that_a_listing_misses_is_not_reported_as_removed(
 ):
     Records(tmp_path).keep_latch(KEYS[3], ANN, frozenset())
     assert checked(disk) == [StopFileChanged(KEYS[3], ANN)]
-    monkeypatch.setattr("os.listdir", lambda _folder: [])
+    monkeypatch.setattr(Path, "iterdir", lambda _folder: iter(()))
     assert checked(disk) == []
 
 
@@ -263,6 +280,6 @@ def test_every_file_is_looked_at_in_a_folder_that_cannot_be_listed(
     def refuse(_folder):
         raise PermissionError("not listed")
 
-    monkeypatch.setattr("os.listdir", refuse)
+    monkeypatch.setattr(Path, "iterdir", refuse)
     assert checked(disk) == [StopFileChanged(KEYS[3], ANN)]
     assert looked == KEYS

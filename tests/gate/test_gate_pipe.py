@@ -105,3 +105,25 @@ class TestFraming:
             pipe_module.WireError, match="a message of 4294967295 bytes"
         ):
             Unpacker(FromGate).feed(b"\xff" * 8)
+
+
+def test_messages_that_wait_are_written_with_one_call(monkeypatch):
+    read, write = os.pipe()
+    calls, real = [], os.write
+    box = PipeWriter(write)
+    box.close(5.0)  # the thread has ended: what comes now waits
+
+    def noted(file, data):
+        if file == write:
+            calls.append(len(data))
+        return real(file, data)
+
+    monkeypatch.setattr(os, "write", noted)
+    for number in range(10):
+        box.put(Ready(number))
+    box._queue.put(None)
+    box._write()
+    assert len(calls) == 1
+    assert len(os.read(read, 1 << 16)) == sum(calls)
+    os.close(read)
+    os.close(write)

@@ -210,6 +210,7 @@ async def test_an_error_while_sending_one_last_zero_does_not_prevent_the_others(
         assert next(iter(gate.shell._links._watched)).topic == "/cmd_vel"
         before = len(bridge.of("publish", "/second"))
         monkeypatch.setattr(ControlLane, "write", break_on_the_first)
+        monkeypatch.setattr(ControlLane, "write_zeros", lambda *_: 1 / 0)
         monkeypatch.setattr(gate.shell._gate, "handle", lambda *_: 1 / 0)
         gate.shell.deliver(protocol.Heartbeat())
         async with asyncio.timeout(5):

@@ -21,11 +21,13 @@ from link_bench import (
     until,
 )
 from websockets.asyncio.server import serve
+from websockets.client import ClientProtocol
 
 from webmap.base.errors import BridgeClosed
 from webmap.gate.lanes import sockets
 from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.sockets import Socket, open_socket
+from webmap.ros.rosbridge.pieces import Pieces
 
 pytestmark = pytest.mark.slow
 
@@ -332,16 +334,59 @@ class TestEnd:
             assert "reset" in seen.lost[0]
 
     @in_loop
-    async def test_a_message_that_is_too_long_closes_the_socket(self, monkeypatch):
-        monkeypatch.setattr(sockets, "MAX_FRAME", 100)
+    async def test_a_message_that_is_too_long_closes_the_socket(self):
         seen = Received()
+        size = sockets.MAX_FRAME + 1
 
         async def talk(link):
             await link.accept()
-            link.send(frame(TEXT, b"x" * 101))
+            link.send(b"\x81\x7f" + size.to_bytes(8, "big") + bytes(size))
             await forever(link)
 
         async with raw_bridge(talk) as url:
             link = await opened(url, seen)
             await until(lambda: seen.lost, "the loss")
             assert (seen.texts, link.is_open) == ([], False)
+
+
+def test_a_whole_message_is_recognized_by_its_head():
+    def heads(data):
+        pieces, waiting, found = Pieces(), bytearray(data), []
+        while size := pieces.next(waiting, handshake_done=True):
+            found.append(pieces.head)
+            del waiting[:size]
+        return found
+
+    text = frame(TEXT, b"{}")
+    assert heads(text + b"\x82\x7e\x00\x80" + bytes(128)) == [2, 4]
+    part, end, ping = frame(TEXT, b"{", final=False), frame(0, b"}"), frame(PING)
+    masked = b"\x81\x80abcd"
+    assert heads(part + end + ping + masked) == [0, 0, 0, 0, 0]
+    assert heads(text[:1]) == []
+
+
+@in_loop
+async def test_websockets_reads_only_what_is_no_whole_message(monkeypatch):
+    pieces, read = [], ClientProtocol.receive_data
+
+    def noted(protocol, data=b""):
+        pieces.append(data)
+        read(protocol, data)
+
+    parts = [frame(TEXT, b"2", final=False), frame(MORE, b"3")]
+    after = frame(CLOSE) + frame(TEXT, b"after the close frame")
+
+    async def talk(link):
+        await link.accept(frame(TEXT, b"1") + b"".join(parts) + frame(TEXT, b"4"))
+        await until(lambda: len(seen.texts) == 3, "the messages")
+        link.send(after)
+        await link.reader.read()
+
+    seen = Received()
+    monkeypatch.setattr(ClientProtocol, "receive_data", noted)
+    async with raw_bridge(talk) as url:
+        link = await opened(url, seen)
+        assert link._transport.max_size == sockets.MAX_WAITING
+        await until(lambda: seen.lost, "the end")
+    assert seen.texts == [b"1", b"23", b"4"]
+    assert [piece for piece in pieces if piece[:1] in b"\x00\x01\x80\x81"] == parts

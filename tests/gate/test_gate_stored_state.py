@@ -101,12 +101,14 @@ class Links:
         self.written = []
 
     def perform(self, action):
-        if not isinstance(action, actions.WriteTwist):
-            return None
-        self.written.append((action.key, action.twist))
-        return events.TwistWritten(
-            action.key, action.twist, action.epoch, action.by, True
-        )
+        assert not isinstance(action, actions.WriteTwist), "nothing but zeros"
+
+    def write_zeros(self, zeros):
+        self.written += [(zero.key, zero.twist) for zero in zeros]
+        return [
+            events.TwistWritten(zero.key, zero.twist, zero.epoch, zero.by, True)
+            for zero in zeros
+        ]
 
 
 class Outbox:

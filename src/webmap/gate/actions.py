@@ -34,6 +34,14 @@ class Watch:
 
 
 @dataclass(frozen=True, slots=True)
+class PingOften:
+    """Ping the links of a watched machine often, as :class:`Watch` begins, or not."""
+
+    key: Key
+    on: bool
+
+
+@dataclass(frozen=True, slots=True)
 class WriteTwist:
     """Write a velocity now or drop it; answered by ``TwistWritten``.
 
@@ -168,6 +176,7 @@ Action = (
     Attach
     | Detach
     | Watch
+    | PingOften
     | WriteTwist
     | SendGoal
     | SendPose

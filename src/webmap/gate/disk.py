@@ -19,7 +19,7 @@ import json
 import logging
 import math
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from pathlib import Path
@@ -48,7 +48,9 @@ UNKNOWN = "an earlier session"
 LARGEST = 1 << 16
 """Most bytes of a file."""
 
-UNSEEN = (0, 0)
+Stamp = tuple[int, int]
+
+UNSEEN: Stamp = (0, 0)
 """The stamp of a file that the next check reports in any case."""
 
 MAX_NAME = 80
@@ -76,12 +78,13 @@ def _names_of(key: Key) -> tuple[str, ...]:
     return tuple(hashlib.sha256("\n".join(k).encode()).hexdigest()[:24] for k in keys)
 
 
-def _places_of(folder: Path, key: Key) -> list[Path]:
-    """Return the paths where a STOP may be, in the order to look at them."""
-    paths = _paths_of(folder, key, "stop")
+@lru_cache(maxsize=1 << 14)
+def _stops_of(key: Key) -> tuple[str, ...]:
+    """Return the names of the files where a STOP may be, in the order to look."""
+    stops = [f"{name}.stop" for name in _names_of(key)]
     # A STOP that was being lifted when a gate died has not been lifted. Another gate
     # may move it aside and back meanwhile, so the first ones are looked at again.
-    return [*paths, *map(_aside, paths), *paths]
+    return (*stops, *(_aside(Path(stop)).name for stop in stops), *stops)
 
 
 def _aside(path: Path) -> Path:
@@ -101,26 +104,27 @@ class Records:
 
     def latch_of(self, key: Key) -> Press | None:
         """Return the active STOP of a machine, if there is one."""
-        found = map(_press_in, _places_of(self._folder, key))
+        found = map(_press_in, map(self._folder.joinpath, _stops_of(key)))
         return next((press for press in found if press is not None), None)
 
-    def may_be_stopped(self, keys: Iterable[Key]) -> set[Key]:
-        """Return those of the machines that may have a STOP file, by one listing.
-
-        The folder of a thousand machines rarely has more than a few STOP files.
-        """
+    def changed(self, stamps: Mapping[Key, Stamp | None]) -> list[Key]:
+        """Return whose STOP file may have another stamp now, by one listing."""
+        listed: dict[str, Stamp | None] = {}
         try:
-            files = os.listdir(self._folder)
+            for path in self._folder.iterdir():
+                if ".stop" in path.name:
+                    listed[path.name] = _stamp(path)
         except OSError:  # each file may be there nevertheless
-            return set(keys)
-        names = {name.partition(".")[0] for name in files if ".stop" in name}
-        if not names:
-            return set()
-        return {key for key in keys if not names.isdisjoint(_names_of(key))}
+            return list(stamps)
+        found = {
+            key: next(filter(None, map(listed.get, _stops_of(key))), None)
+            for key in stamps
+        }
+        return [key for key in stamps if found[key] != stamps[key]]
 
-    def stamp_of(self, key: Key) -> tuple[int, int] | None:
+    def stamp_of(self, key: Key) -> Stamp | None:
         """Return a value that changes with the STOP file; ``None`` without a file."""
-        found = map(_stamp, _places_of(self._folder, key))
+        found = map(_stamp, map(self._folder.joinpath, _stops_of(key)))
         return next((stamp for stamp in found if stamp is not None), None)
 
     def keep_latch(
@@ -206,7 +210,7 @@ def _press_in(path: Path) -> Press | None:
     return Press(by[:MAX_NAME], id)
 
 
-def _stamp(path: Path) -> tuple[int, int] | None:
+def _stamp(path: Path) -> Stamp | None:
     try:
         found = path.lstat()
     except OSError:
@@ -256,7 +260,7 @@ class Disk:
         self._records = records
         self._thread = ThreadPoolExecutor(1, "gate-disk")
         self._under_way: set[asyncio.Future[Event]] = set()
-        self._stamps: dict[Key, tuple[int, int] | None] = {}
+        self._stamps: dict[Key, Stamp | None] = {}
 
     def recall(self, state: LockState) -> LockState:
         """Return ``state`` with the machine's STOP and stop test from the disk."""
@@ -285,14 +289,10 @@ class Disk:
     def _changed(self) -> list[StopFileChanged]:
         seen = []
         stamps = self._stamps.copy()
-        listed = self._records.may_be_stopped(stamps)
-        for key, before in stamps.items():
-            # A listing may miss a file that is being replaced, so one that was there
-            # before is looked at itself.
-            if before is None and key not in listed:
-                continue
+        for key in self._records.changed(stamps):
+            # A listing may miss a file that is being replaced.
             stamp = self._records.stamp_of(key)
-            if stamp != before and key in self._stamps:
+            if stamp != stamps[key] and key in self._stamps:
                 self._stamps[key] = stamp
                 seen.append(StopFileChanged(key, self._records.latch_of(key)))
         return seen
@@ -317,7 +317,7 @@ class Disk:
         if self._under_way:
             await asyncio.wait(self._under_way)
 
-    def _stamp_after(self, action: SaveStop) -> tuple[int, int] | None:
+    def _stamp_after(self, action: SaveStop) -> Stamp | None:
         """Return the stamp of the file that this gate has just written.
 
         Another gate may have replaced or removed the file since, and after a reset

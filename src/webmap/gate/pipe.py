@@ -118,7 +118,11 @@ class PipeWriter:
 
     def _write(self) -> None:
         with contextlib.suppress(OSError):  # the display has closed the pipe
-            while (data := self._queue.get()) is not None:
+            frames: list[bytes | None] = [b""]
+            while frames[-1] is not None:
+                frames = [self._queue.get()]
+                frames += [self._queue.get() for _ in range(self._queue.qsize())]
+                data = memoryview(b"".join(filter(None, frames)))
                 while data:
                     data = data[os.write(self._file, data) :]
 

@@ -10,6 +10,7 @@ case it first sends zero to every driven machine, for half a second at most.
 import asyncio
 import contextlib
 import gc
+import itertools
 import logging
 import os
 import signal
@@ -17,6 +18,7 @@ import sys
 import threading
 from collections import deque
 from types import FrameType
+from typing import cast
 
 from webmap.base.errors import WireError
 from webmap.base.logs import set_up_logging
@@ -134,10 +136,17 @@ class Shell:
                 self.deliver(seen)
 
     def _do(self, todo: list[actions.Action]) -> None:
-        for action in todo:
-            result = self._perform(action)
-            if result is not None:
-                self._do(self._gate.handle(result, now()))
+        for zeros, group in itertools.groupby(todo, _is_zero):
+            some = list(group)
+            # All zeros are written before the rules get the result of the first.
+            results = (
+                self._links.write_zeros(cast("list[actions.WriteTwist]", some))
+                if zeros
+                else map(self._perform, some)
+            )
+            for result in results:
+                if result is not None:
+                    self._do(self._gate.handle(result, now()))
 
     def _perform(self, action: actions.Action) -> events.Event | None:
         match action:
@@ -156,7 +165,7 @@ class Shell:
             case actions.SaveStop() | actions.SaveStopTest():
                 self._disk.keep(action, self.deliver)
             case actions.Watch(key, on):
-                self._watched = self._watched | {key} if on else self._watched - {key}
+                (self._watched.add if on else self._watched.discard)(key)
                 return self._links.perform(action)
             case _:
                 return self._links.perform(action)
@@ -191,6 +200,10 @@ class Shell:
             for key in self._watched:
                 with contextlib.suppress(Exception):
                     self._links.perform(actions.WriteTwist(key, ZERO, None, None))
+
+
+def _is_zero(action: actions.Action) -> bool:
+    return isinstance(action, actions.WriteTwist) and action.twist.is_zero
 
 
 def rise() -> bool:

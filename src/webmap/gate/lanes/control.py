@@ -16,13 +16,14 @@ Two things prove arrival.
 
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from webmap.base.geometry import Twist
 from webmap.gate.clock import now
 from webmap.gate.events import EchoReceived, Event, Key, LinkDown, LinkUp, PingAnswered
 from webmap.gate.lanes import rosbridge
 from webmap.gate.lanes.lane import Lane
+from webmap.gate.rules.motion import ZERO
 from webmap.ros.rosbridge import ops
 
 MOST = 6
@@ -46,16 +47,16 @@ class UnconfirmedWrites:
 
     def room(self, topic: str) -> bool:
         """Return whether one more moving velocity may be written."""
-        waiting = self._on_the_way.get(topic, ())
-        return sum(not twist.is_zero for _, twist in waiting) < MOST
+        return len(self._on_the_way.get(topic, ())) < MOST
 
     def on_written(self, topic: str, twist: Twist) -> None:
-        """Note a velocity that was written."""
+        """Note a velocity that was written; a zero takes no room."""
+        if twist.is_zero:
+            return
         self._written += 1
         self._on_the_way.setdefault(topic, deque()).append((self._written, twist))
-        if not twist.is_zero:
-            unechoed = self._unechoed.setdefault(topic, deque(maxlen=REMEMBERED))
-            unechoed.append((self._written, twist))
+        unechoed = self._unechoed.setdefault(topic, deque(maxlen=REMEMBERED))
+        unechoed.append((self._written, twist))
 
     def on_ping(self, number: int, now: float) -> None:
         """Note that a ping is written at ``now``; the numbers of pings grow."""
@@ -179,6 +180,7 @@ class ControlLane:
             hello = ops.advertise(topic, type, id=id)
             self.lane.hold(id, hello, ops.unadvertise(topic, id=id))
             self._types[topic] = type
+        self.lane.budget.topics = len(self._types)
 
     def listen(self, topic: str) -> None:
         """Ping often from now on: ``topic`` may be written to."""
@@ -186,8 +188,8 @@ class ControlLane:
         self.lane.ping_every(BUSY_PING)
 
     def ignore(self, topic: str) -> None:
-        """Undo :meth:`listen`."""
-        self._listened.remove(topic)
+        """Undo :meth:`listen`, if that was called."""
+        self._listened.discard(topic)
         if not self._listened:
             self.lane.ping_every(IDLE_PING)
 
@@ -217,6 +219,15 @@ class ControlLane:
             self._unconfirmed.on_written(topic, twist)
         return done
 
+    def write_zeros(self, frames: Mapping[Key, str]) -> list[Key]:
+        """Write zeros to machines, given with their frames; return which got one."""
+        known = [key for key in frames if key.topic in self._types]
+        zeros = [
+            rosbridge.velocity(key.topic, self._types[key.topic], ZERO, frames[key])
+            for key in known
+        ]
+        return known if self.lane.write(*zeros, only_if_clear=False) else []
+
     def _open(self) -> None:
         self._unconfirmed.begin()  # the bytes in the previous link are lost
         self._emit(LinkUp(self._url, "control"))
@@ -228,7 +239,7 @@ class ControlLane:
         self._emit(PingAnswered(self._url, self._unconfirmed.on_pong(number)))
 
     def _on_message(self, data: bytes) -> None:
-        message = rosbridge.parse(data)
+        message = rosbridge.parse_echo(data)
         if message is None or message.topic not in self._types or message.twist is None:
             return
         if not message.twist.is_finite:

@@ -1,7 +1,6 @@
 """A lane: one socket to a bridge that is opened again when it ends."""
 
 import asyncio
-import contextlib
 import logging
 import math
 import random
@@ -130,7 +129,7 @@ class Lane:
         self._pong = pong
         self._holds: dict[str, Announcement] = {}
         self._socket: Socket | None = None
-        self._budget = Budget()
+        self.budget = Budget()
         self._trouble: str | None = None
         """Why the last socket was lost; None if :meth:`spend` handed it over."""
         self._changed = asyncio.Event()
@@ -162,12 +161,12 @@ class Lane:
             self._send_announcement(held.goodbye)
 
     def write(
-        self, data: bytes, *, only_if_clear: bool, until: float = math.inf
+        self, *messages: bytes, only_if_clear: bool, until: float = math.inf
     ) -> bool:
-        """Write a message now or drop it; return whether it was written.
+        """Write messages now or drop them; return whether they were written.
 
         Args:
-            data: The message.
+            messages: The messages, which are written in one piece.
             only_if_clear: Drop it if other bytes wait to be sent before it.
             until: When it is too old, by the gate's clock.
 
@@ -175,7 +174,7 @@ class Lane:
         link = self._socket
         if link is None or not link.is_open or (only_if_clear and link.unsent):
             return False
-        return link.send(data, until)
+        return link.send(*messages, until=until)
 
     def cut(self, why: str) -> None:
         """Discard the socket, with all that it has not sent, and connect again."""
@@ -228,7 +227,7 @@ class Lane:
         while True:
             try:
                 handlers = SocketHandlers(self._text, self._on_pong, self._lost)
-                link = await open_socket(self.url, handlers, self._budget)
+                link = await open_socket(self.url, handlers, self.budget)
             except BridgeClosed as error:
                 if attempts.is_new(str(error)):
                     log.warning("no connection: %s", error)
@@ -268,9 +267,9 @@ class Lane:
             self._pinged(self._pings)
             self._socket.ping(self._pings.to_bytes(8, "big"))
             self._changed.clear()
-            with contextlib.suppress(TimeoutError):
-                async with asyncio.timeout(self.ping_period):
-                    await self._changed.wait()
+            alarm = loop.call_later(self.ping_period, self._changed.set)
+            await self._changed.wait()
+            alarm.cancel()
 
     def ping_every(self, period: float) -> None:
         """Ping every ``period`` seconds from now on; at once if that is more often."""

@@ -1,7 +1,7 @@
 """All lanes to all bridges, and which lanes each robot needs."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from webmap.gate import actions
 from webmap.gate.events import (
@@ -47,6 +47,20 @@ class Links:
         self._robots: dict[Key, dict[str, RobotSpec]] = {}
         self._watched: dict[Key, list[RobotSpec]] = {}
 
+    def write_zeros(self, zeros: Sequence[actions.WriteTwist]) -> list[TwistWritten]:
+        """Write zeros to machines, those of one bridge in one piece."""
+        frames: dict[str, dict[Key, str]] = {}
+        for zero in zeros:
+            of_url = frames.setdefault(zero.key.url, {})
+            of_url[zero.key] = self._base_frame(zero.key)
+        done: set[Key] = set()
+        for url in frames.keys() & self._control.keys():
+            done.update(self._control[url].write_zeros(frames[url]))
+        return [
+            TwistWritten(zero.key, ZERO, zero.epoch, zero.by, zero.key in done)
+            for zero in zeros
+        ]
+
     def perform(self, action: actions.Action) -> Event | None:
         """Perform an action; return the event with its result, if the rules need it."""
         match action:
@@ -70,6 +84,8 @@ class Links:
                 self._unwatch(key)
                 if on:
                     self._watch(key)
+            case actions.PingOften(key, on):
+                self._ping_often(key, on)
             case actions.CutLink(url):
                 if url in self._control:
                     self._control[url].lane.cut(NO_ANSWER)
@@ -88,10 +104,9 @@ class Links:
 
     def zero_all(self) -> None:
         """Write zero to every machine that may be driven, without the rules."""
-        for key in self._watched:
-            if key.url in self._control:
-                frame = self._base_frame(key)
-                self._control[key.url].write(key.topic, ZERO, frame=frame)
+        self.write_zeros(
+            [actions.WriteTwist(k, ZERO, None, None) for k in self._watched]
+        )
 
     async def settle(self) -> None:
         """Wait until all service calls, such as cancels, have ended."""
@@ -191,6 +206,14 @@ class Links:
                 odometry.unwatch(spec.odometry_topic, key)
             if spec.assist is not None:
                 self._odometry_at(spec.bridge_url).unwatch_scan(spec.assist.topic, key)
+
+    def _ping_often(self, key: Key, on: bool) -> None:
+        specs = self._watched.get(key, [])
+        if any(spec.twist_topic is not None for spec in specs):
+            control = self._control[key.url]
+            (control.listen if on else control.ignore)(key.topic)
+        for url in {url for spec in specs for url in _odometry_urls_of(spec)}:
+            self._odometry_at(url).ping_often(key, on)
 
     def _odometry_at(self, url: str) -> OdometryLane:
         if url not in self._odometry:

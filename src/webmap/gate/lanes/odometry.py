@@ -147,7 +147,7 @@ THROTTLE = 50
 """Milliseconds between two messages at least."""
 
 BUSY_PING = 0.05
-"""Seconds between pings while anything is watched."""
+"""Seconds between pings while anything is watched that does not rest."""
 
 
 class OdometryLane:
@@ -168,6 +168,8 @@ class OdometryLane:
         """A message that comes now was sent after this time."""
         self._watchers: dict[str, list[Key]] = {}
         self._scanners: dict[str, list[Key]] = {}
+        self._often: set[Key] = set()
+        """The machines for which pings are needed often."""
         self.lane = Lane(
             url,
             up=self._open,
@@ -186,7 +188,7 @@ class OdometryLane:
             ops.subscribe(topic, id=id, type=type, throttle_rate=THROTTLE),
             ops.unsubscribe(topic, id=id),
         )
-        self._pace()
+        self.ping_often(key, True)
 
     def unwatch(self, topic: str, key: Key) -> None:
         """Undo one :meth:`watch`."""
@@ -194,14 +196,14 @@ class OdometryLane:
         if not self._watchers[topic]:
             del self._watchers[topic]
         self.lane.release_hold(f"webmap-gate odometry {topic}")
-        self._pace()
+        self.ping_often(key, False)
 
     def watch_scan(self, topic: str, key: Key) -> None:
         """Receive the scans of the machine ``key``."""
         self._scanners.setdefault(topic, []).append(key)
         id = f"webmap-gate scan {topic}"
         self.lane.hold(id, subscribe(topic, id), ops.unsubscribe(topic, id=id))
-        self._pace()
+        self.ping_often(key, True)
 
     def unwatch_scan(self, topic: str, key: Key) -> None:
         """Undo one :meth:`watch_scan`."""
@@ -209,11 +211,13 @@ class OdometryLane:
         if not self._scanners[topic]:
             del self._scanners[topic]
         self.lane.release_hold(f"webmap-gate scan {topic}")
-        self._pace()
+        self.ping_often(key, False)
 
-    def _pace(self) -> None:
-        watched = self._watchers or self._scanners
-        self.lane.ping_every(BUSY_PING if watched else Lane.PING)
+    def ping_often(self, key: Key, on: bool) -> None:
+        """Ping often for the machine ``key``, or end that."""
+        (self._often.add if on else self._often.discard)(key)
+        self.lane.ping_every(BUSY_PING if self._often else Lane.PING)
+        self.lane.budget.topics = len(self._watchers) + len(self._scanners)
 
     def _open(self) -> None:
         self._pings.clear()  # the previous link's pings are not answered any more

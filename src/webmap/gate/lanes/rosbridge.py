@@ -10,6 +10,7 @@ whose clock differs would refuse a command, or accept an old one as new.
 
 import json
 import math
+from functools import lru_cache
 from typing import Any
 
 import msgspec
@@ -23,6 +24,10 @@ from webmap.ros.decoding import check_depth
 from webmap.ros.names import is_type
 from webmap.ros.rosbridge import ops
 
+MOST_KEPT, SHORT = 4096, 512
+"""How many velocities and how many echoes are kept, because zeros repeat; an echo is
+kept if it is short, in bytes."""
+
 MOST_PARTS = 20_000
 """The most values in a message. A dense scan in JSON has 7,200, any message that the
 gate subscribes to in JSON a few hundred."""
@@ -35,6 +40,8 @@ def check_parts(data: bytes) -> None:
         ProtocolError: If it does.
 
     """
+    if len(data) <= MOST_PARTS:
+        return
     # Each value but the first follows one of these; texts may contain them, too.
     parts = sum(map(data.count, (b"[", b"{", b",")))
     if parts > MOST_PARTS:
@@ -66,6 +73,7 @@ def plain(data: bytes) -> Any:
     return value
 
 
+@lru_cache(maxsize=MOST_KEPT)
 def velocity(topic: str, type: str, twist: Twist, frame: str = "") -> bytes:
     """Return the operation that publishes a velocity, in the frame of the base.
 
@@ -213,6 +221,14 @@ def parse(data: bytes) -> Received | None:
         return None
     id = None if frame.id is None else str(frame.id)
     return Received(frame.op, id, frame.topic, _velocity(frame.msg))
+
+
+def parse_echo(data: bytes) -> Received | None:
+    """Return the parts of an echo, as :func:`parse`."""
+    return _parse_short(data) if len(data) <= SHORT else parse(data)
+
+
+_parse_short = lru_cache(maxsize=MOST_KEPT)(parse)
 
 
 def _lenient(data: bytes) -> _Frame | None:

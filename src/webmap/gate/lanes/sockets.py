@@ -16,7 +16,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import cast
+from typing import Any, cast
 
 from websockets.client import ClientProtocol
 from websockets.exceptions import WebSocketException
@@ -44,8 +44,8 @@ MAX_PARTS = 4096
 """The most frames in one message. Bridges send one, some proxies a few."""
 
 MAX_WAITING = 1 << 16
-"""With more bytes than this waiting for their turn, no more are read. asyncio reads up
-to 256 KiB at once, so at most that much more waits."""
+"""With more bytes than this waiting for their turn, no more are read. As many are read
+at once: for 256 KiB, as asyncio has it, the system gets new memory for each message."""
 
 # "Linger 0": the kernel drops unsent bytes on close and resets the connection.
 _LINGER = struct.pack("hh" if sys.platform == "win32" else "ii", 1, 0)
@@ -104,19 +104,20 @@ class Socket(asyncio.Protocol):
         """Written bytes that the kernel has not accepted yet."""
         return 0 if self._transport is None else self._transport.get_write_buffer_size()
 
-    def send(self, data: bytes, until: float = math.inf) -> bool:
-        """Write one text message, unless it is too old; return whether it was written.
+    def send(self, *messages: bytes, until: float = math.inf) -> bool:
+        """Write text messages, unless they are too old; return whether it was done.
 
         The clock is read at the last moment. Otherwise a process that was stopped
         (SIGSTOP, a laptop that sleeps) would first write a velocity that was decided
         before, when it goes on.
 
         Args:
-            data: The message.
-            until: When it is too old, by the gate's clock.
+            messages: The messages; one call of the system is enough for all.
+            until: When they are too old, by the gate's clock.
 
         """
-        self._protocol.send_text(data)
+        for data in messages:
+            self._protocol.send_text(data)
         return self._flush(until)
 
     def ping(self, data: bytes) -> None:
@@ -150,6 +151,7 @@ class Socket(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Send the handshake of the WebSocket."""
         self._transport = cast("asyncio.Transport", transport)
+        cast("Any", transport).max_size = MAX_WAITING
         self._budget.note(now(), behind=False)  # the previous socket may have been
         self._protocol.send_request(self._protocol.connect())
         self._flush()
@@ -202,8 +204,12 @@ class Socket(asyncio.Protocol):
             piece = bytes(self._waiting[:length])
             del self._waiting[:length]
             try:
-                self._protocol.receive_data(piece)
-                self._take_events()
+                head = 0 if self._parts else self._pieces.head
+                if head and self._protocol.state is State.OPEN:
+                    self._pass_on(piece[head:])
+                else:
+                    self._protocol.receive_data(piece)
+                    self._take_events()
             except Exception as error:
                 self.drop(f"invalid data from the bridge: {error!r}")
             pieces, size = pieces + 1, size + length

@@ -130,11 +130,15 @@ class CommandHandler:
         self._machines.find(robot).robots.goals[robot].cancel(now, why)
 
     def stop(self, robot: str | None, by: Connection, now: float) -> None:
-        """STOP a robot or, with ``None``, all robots."""
+        """STOP a robot or, with ``None``, all robots: first the zeros of all."""
         press = new_press(by.name or by.id)
-        for machine in (
-            self._machines if robot is None else [self._machines.find(robot)]
-        ):
+        stopped = (
+            list(self._machines) if robot is None else [self._machines.find(robot)]
+        )
+        for machine in stopped:
+            if machine.robots.drivable:
+                machine.motion.begin_zeros(now)
+        for machine in stopped:
             machine.stop(press, now)
 
     def stop_malformed(self, robot: str | None, by: Connection, now: float) -> str:

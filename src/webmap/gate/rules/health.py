@@ -5,7 +5,7 @@ from bisect import bisect_left, insort
 from collections import deque
 
 from webmap.base.geometry import Twist
-from webmap.gate.actions import Emit, Watch
+from webmap.gate.actions import Emit, PingOften, Watch
 from webmap.gate.events import Key
 
 WINDOW = 2.0
@@ -217,14 +217,18 @@ class Observation:
         self.measured: Twist | None = None
         self._seen: tuple[float, float] | None = None
         """A time before the newest velocity was sent, and its time of arrival."""
+        self._often = True
         self._key = key
         self._emit = emit
 
-    def update(self, on: bool) -> None:
-        """Subscribe to echo and odometry, or unsubscribe and forget both."""
+    def update(self, on: bool, often: bool = True) -> None:
+        """Subscribe to echo and odometry, and ping often; or unsubscribe and forget."""
         if on != self.on:
-            self.on = on
+            self.on, self._often = on, True
             self._emit(Watch(self._key, on))
+        if on and often != self._often:
+            self._often = often
+            self._emit(PingOften(self._key, often))
         if not on:
             self.measured = self.echoed = self._seen = None
 

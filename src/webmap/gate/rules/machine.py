@@ -16,6 +16,7 @@ STOP latches: from any state the machine gets zero and the lease ends. It stays 
 a reset, which leads to *free*.
 """
 
+import math
 from typing import Literal
 
 from webmap.base.geometry import Twist
@@ -29,7 +30,7 @@ from webmap.gate.rules.authority import Authority, MotionConditions
 from webmap.gate.rules.connections import Epochs
 from webmap.gate.rules.driving import Driving
 from webmap.gate.rules.health import DisplayPulse, LinkHealth, Observation
-from webmap.gate.rules.motion import Motion
+from webmap.gate.rules.motion import HELD_PERIOD, Motion
 from webmap.gate.rules.obedience import EXPECTED_FOR, Obedience, OtherWriter
 from webmap.gate.rules.speeds import MachineSpeeds
 from webmap.gate.rules.stop import ActiveStop, StopLatch
@@ -105,8 +106,11 @@ class Machine:
         self.active_stop = ActiveStop(key, latch, self.robots, control, self.motion)
         self._emit = emit
         self._left_at = float("-inf")
-        self.reported_at = float("-inf")
-        """When its reports were made last, sent or not."""
+        self.reported: tuple[object, ...] | None = None
+        """What :meth:`shown` returned when it was reported last, sent or not."""
+        self.reported_at = -math.inf
+        self.due_at = -math.inf
+        """When its next step is due; at 10 Hz while the machine rests."""
 
     @property
     def state(self) -> State:
@@ -141,12 +145,27 @@ class Machine:
 
     @property
     def rests(self) -> bool:
-        """Whether a STOP is active, and nobody has control or sends a velocity."""
+        """Whether a STOP is active, and nobody has control or moves the machine."""
         return (
             self.latch.on
             and self.authority.lease is None
-            and self.silent
+            and (self.silent or self.motion.stopping)
             and not self.authority.handover.going_on
+        )
+
+    def next_step(self, now: float) -> float:
+        """Return when :meth:`step` is due, after a step or an event at ``now``."""
+        at_rest = min(self.due_at, self.motion.zero_at, now + HELD_PERIOD)
+        return at_rest if self.rests else -math.inf
+
+    def shown(self, now: float) -> tuple[object, ...]:
+        """Return what reports show of a machine that rests and no event reports."""
+        seen, sight = self.active_stop.confirmation, self.observation
+        return (
+            (seen.confirmed, seen.why, self.obedience.alarm(now)),
+            (sight.echoed, sight.shown(now), self.motion.owes_zero),
+            (self.other_writer.seen, self.other_writer.nodes),
+            *(goals.report for goals in self.robots.goals.values()),
         )
 
     def involves(self, connection: str) -> bool:
@@ -222,6 +241,7 @@ class Machine:
 
     def _expect_standstill(self, now: float) -> None:
         self.obedience.expect(now, firmly=True)
+        self.observation.update(True)  # a ping at once: its answer proves the zero
         self._update_watch(now)
 
     def reset(self, stop: str, now: float) -> None:
@@ -298,8 +318,10 @@ class Machine:
         measured = self.robots.axes.seen(measured)
         self.observation.observe(measured, sent_after, now)
         seen, handover = self.active_stop.confirmation, self.authority.handover
-        if self.latch.on and self.observation.shows_since(seen.since):
-            seen.observe(measured, now)
+        if self.latch.on:
+            if self.observation.shows_since(seen.since):
+                seen.observe(measured, now)
+            self.active_stop.confirm(now)  # the next step may be 100 ms away
         if handover.successor is not None and self.observation.shows_since(
             handover.since
         ):
@@ -341,7 +363,8 @@ class Machine:
             or self.latch.on
             or not self.silent
             or self.authority.handover.successor is not None
-            or (self.robots.has_odometry and self.obedience.watching(now))
+            or (self.robots.has_odometry and self.obedience.watching(now)),
+            often=not self.rests,
         )
         if not self.observation.on:
             self.scan_assist.forget()

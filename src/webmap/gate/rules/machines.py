@@ -1,7 +1,10 @@
 """All machines of one display: declarations, and events for them. No I/O."""
 
 import logging
+import math
+from bisect import bisect_right
 from collections.abc import Callable, Iterator
+from operator import attrgetter
 from typing import Any
 
 import msgspec
@@ -27,6 +30,18 @@ from webmap.gate.rules.stop import StopLatch, newer_stop
 from webmap.gate.specs import check_twist_type, checked, key_of
 
 log = logging.getLogger("webmap.gate")
+
+RESTING_INTERVAL = 0.75 * INTERVAL
+"""The same for a machine that rests: its steps are not 100 ms apart to the millisecond,
+and the next one comes late."""
+
+REPORTS = 3000
+"""The most reports in a second on machines that rest, if the verdicts do not change."""
+
+SLICE = 200
+"""The most machines that rest in one step: those of 1,000 within 50 ms."""
+
+_due_at = attrgetter("due_at")
 
 Refuse = Callable[[str, str | None, str, str, float], None]
 
@@ -171,28 +186,44 @@ class Machines:
                 latch.reset()
                 self._resets[key] = by, robot
                 if there is not None:
-                    self._sort(there)
+                    self._sort(there, now)
 
     def step(self, now: float) -> None:
         """Do what is due for each active machine, and close stalled control links.
 
-        A report takes longer than a step. Machines that rest, as all do after STOP ALL,
-        are reported after an event, when a step changes the verdict on the STOP, and
-        otherwise once in :data:`INTERVAL`.
+        A report takes longer than a step. A machine that rests, as all do after STOP
+        ALL, is reported when the verdict on the STOP changes, and now and then when the
+        report has other news.
         """
-        if self._awake:
-            for machine in [m for m in self._by_key.values() if m in self._awake]:
-                before = machine.rests, machine.active_stop.confirmation.confirmed
-                machine.step(now)
-                after = machine.rests, machine.active_stop.confirmation.confirmed
-                same = after == before and machine.rests
-                if not same or now >= machine.reported_at + INTERVAL:
-                    self._touched.add(machine.key)
-                self._drop_if_empty(machine)
+        early = now - max(RESTING_INTERVAL, len(self._awake) / REPORTS)
+        for machine in self._due(now):
+            stop = machine.active_stop.confirmation
+            before = machine.rests, stop.confirmed
+            machine.step(now)
+            machine.due_at = math.inf
+            calm = machine.rests and before == (True, stop.confirmed)
+            is_old = machine.reported_at <= early
+            if calm and not (is_old and machine.reported != machine.shown(now)):
+                self._sort(machine, now)
+            else:
+                self._touched.add(machine.key)
+            self._drop_if_empty(machine)
         self._touched |= self._later
         self._later.clear()
         if now - self._oldest_answer > STALL_LIMIT:
             self._cut_stalled(now)
+
+    def _due(self, now: float) -> list[Machine]:
+        """Return the machines whose step is due: first those that do not rest.
+
+        After STOP ALL the zeros of all machines are due at once. Each step writes a
+        part of them, the most late first, so that no step takes long.
+        """
+        machines = self._by_key.values()
+        due = [m for m in machines if m in self._awake and m.due_at <= now]
+        due.sort(key=_due_at)
+        busy = bisect_right(due, -math.inf, key=_due_at)
+        return due[: busy + SLICE]
 
     def _cut_stalled(self, now: float) -> None:
         """Close stalled control links, and note the oldest answer of the others.
@@ -211,19 +242,23 @@ class Machines:
     def report(self, now: float) -> None:
         """Send a report on each robot whose machine may have changed."""
         touched, self._touched = self._touched, set()
-        for key in touched:
+        for number, key in enumerate(touched):
             machine = self._by_key.get(key)
             if machine is None:
                 continue
-            self._sort(machine)
-            machine.reported_at = now
+            self._sort(machine, now)
+            if number >= SLICE and machine.rests:  # first the zeros of STOP ALL
+                self._later.add(key)
+                continue
+            machine.reported, machine.reported_at = machine.shown(now), now
             # Until the shell reports the lock, it is unknown whether STOP is active.
             if machine.known:
                 for spec in list(machine.robots.specs.values()):
                     self._report(machine, spec, now)
 
-    def _sort(self, machine: Machine) -> None:
-        """Note whether a machine is active now."""
+    def _sort(self, machine: Machine, now: float) -> None:
+        """Note whether a machine is active now, and when its next step is due."""
+        machine.due_at = machine.next_step(now)
         if machine.active:
             self._awake.add(machine)
         else:
@@ -234,11 +269,13 @@ class Machines:
         if reporter is None:  # forgotten; it stays only until the machine has stopped
             return
         latest = report(machine, spec, now)
-        due = reporter.is_due(latest, now)
+        rests = machine.rests
+        due = reporter.is_due(latest, now, RESTING_INTERVAL if rests else INTERVAL)
         if due:
             self._emit(SendToDisplay(latest))
-        elif due is None and not (machine.rests and machine in self._awake):
-            # A machine that is active and rests is reported by its steps.
+        elif due is None and rests:  # its next step reports it
+            machine.reported = None
+        elif due is None:
             self._later.add(machine.key)
 
     # Declarations of the display.
@@ -367,10 +404,13 @@ class Machines:
         self._link(event.url, "control").answered(event.asked_at, now)
 
     def _twist_written(self, event: events.TwistWritten, now: float) -> None:
-        machine = self._of_key(event.key)
+        machine = self._by_key.get(event.key)
         if machine is None:
             return
+        before = machine.motion.sent
         machine.on_written(event, now)
+        if before != machine.motion.sent or not machine.rests:
+            self._touched.add(event.key)
         if event.by is not None and not event.done:
             why = "the command was not sent: the connection or the gate was too slow"
             self._refuse(event.by, machine.robots.newest.id, "drive", why, now)
@@ -424,14 +464,20 @@ class Machines:
         return machine.robots.goals[robot]
 
     def _echo_received(self, event: events.EchoReceived, now: float) -> None:
-        machine = self._of_key(event.key)
+        machine = self._by_key.get(event.key)
         if machine is not None:
             machine.on_echo(event.twist, now)
+            if not machine.rests:
+                self._touched.add(event.key)
 
     def _odometry_received(self, event: events.OdometryReceived, now: float) -> None:
-        machine = self._of_key(event.key)
+        machine = self._by_key.get(event.key)
         if machine is not None:
+            stop = machine.active_stop.confirmation
+            before = stop.confirmed
             machine.observe(event.twist, event.sent_after, now)
+            if not machine.rests or before != stop.confirmed:
+                self._touched.add(event.key)
 
     def _scan_received(self, event: events.ScanReceived, now: float) -> None:
         machine = self._of_key(event.key)

@@ -3,6 +3,7 @@
 Only zeros are repeated: a timer never repeats a command.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -74,6 +75,12 @@ class ZeroBurst:
     def end(self) -> None:
         """Stop sending zeros."""
         self.running = False
+
+    @property
+    def next_at(self) -> float:
+        """When the next zero is due, or the zeros end; infinity after that."""
+        end = self.started_at + self._length
+        return min(self._due, end) if self.running else math.inf
 
     def zero_due(self, now: float) -> bool:
         """Return whether a zero is due at ``now``; the caller must then write it."""
@@ -230,6 +237,13 @@ class Motion:
         """Whether no velocity is written now, nor later without a new event."""
         return not (self.driving or self.stopping or self._left_alone)
 
+    @property
+    def zero_at(self) -> float:
+        """When the next zero is due, or the zeros end; infinity without zeros."""
+        if self.stopping:
+            return self._burst.next_at
+        return self._held.next_at if self._control.up else math.inf
+
     def drive(self, wanted: Twist, lease: Lease, now: float) -> None:
         """Write ``wanted``, within the limits, for the holder of ``lease``."""
         if not self.driving:
@@ -262,12 +276,16 @@ class Motion:
             length: Seconds from now to silence; by default :data:`LENGTH`.
 
         """
+        self.begin_zeros(now, length)
+        self._owe_zero()  # after the zero: no disk access may delay a stop
+
+    def begin_zeros(self, now: float, length: float | None = None) -> None:
+        """Do the first part of :meth:`zero`, which must follow: write zero at once."""
         if self.stopping and self._burst.started_at == now:
             return
         self.driving, self._pending, self._left_alone = False, None, False
         self._burst.start(now, length)
         self._write_zero_if_due(now)
-        self._owe_zero()  # after the zero: no disk access may delay a stop
 
     def hold(self, now: float) -> None:
         """Write zero at once, and continue while STOP is active (S8)."""

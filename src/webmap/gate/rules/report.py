@@ -175,12 +175,14 @@ class Reporter:
         self._last: RobotReport | None = None
         self._at = float("-inf")
 
-    def is_due(self, report: RobotReport, now: float) -> bool | None:
+    def is_due(
+        self, report: RobotReport, now: float, interval: float = INTERVAL
+    ) -> bool | None:
         """Return whether to send ``report`` now; ``None`` means later."""
         last = self._last
         if report == last:
             return False
-        if last is not None and now < self._at + INTERVAL and _alike(report, last):
+        if last is not None and now < self._at + interval and _alike(report, last):
             return None
         self._last, self._at = report, now
         return True

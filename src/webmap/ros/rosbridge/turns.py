@@ -9,7 +9,6 @@ connections get half of the time.
 import asyncio
 import math
 import time
-from collections import deque
 from typing import Protocol
 from weakref import WeakKeyDictionary
 
@@ -73,13 +72,12 @@ class Turns:
     def __init__(self) -> None:
         self.longest_rest = math.inf
         """The longest rest after a step, in seconds; without it, that of the step."""
-        self._queue: deque[Taker] = deque()
+        self._queue: dict[Taker, None] = {}
         self._stepping = False
 
     def ask(self, taker: Taker) -> None:
         """Give ``taker`` a turn soon; a second request before that has no effect."""
-        if taker not in self._queue:
-            self._queue.append(taker)
+        self._queue.setdefault(taker)
         if not self._stepping:
             self._stepping = True
             asyncio.get_running_loop().call_soon(self._step)
@@ -88,10 +86,11 @@ class Turns:
         begun = at = time.thread_time()
         loop = asyncio.get_running_loop()
         while self._queue and at < begun + STEP:
-            taker, left = self._queue.popleft(), begun + STEP - at
+            taker, left = next(iter(self._queue)), begun + STEP - at
+            del self._queue[taker]
             wait = taker.take(Turn(at, min(SHARE, left) if self._queue else left))
             if wait == 0:
-                self._queue.append(taker)
+                self._queue.setdefault(taker)
             elif wait is not None:
                 loop.call_later(wait, self.ask, taker)
             if self._queue:
