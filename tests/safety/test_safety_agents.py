@@ -95,9 +95,15 @@ def let_go_once(bench):
 
 
 def reset(bench):
+    """Press reset until the STOP ends: a lost command is not sent again."""
+
+    def has_ended():
+        bench.driver.order("reset")
+        pass_time(0.5)
+        return not bench.driver.now.get("latched")
+
     wait_for(lambda: bench.driver.now.get("latched"), "a latched STOP")
-    bench.driver.order("reset")
-    wait_for(lambda: not bench.driver.now.get("latched"), "the reset")
+    wait_for(has_ended, "the reset")
 
 
 def test_stop_reaches_the_agent_and_stays(bench):
@@ -259,8 +265,7 @@ def test_a_stop_for_an_agent_that_is_away_is_the_first_it_gets_on_return(bench):
     assert not bench.driver.now.get("latched"), "STOP is active without the agent"
     bench.agent_hop.refuse(False)
     wait_for(lambda: bench.driver.now.get("latched"), "the STOP", 20)
-    bench.driver.order("reset")
-    wait_for(lambda: not bench.driver.now.get("latched"), "the reset")
+    reset(bench)
 
 
 def test_two_displays_cannot_both_drive_and_the_loss_of_one_ends_only_its_own(bench):
