@@ -102,8 +102,14 @@ class Bench:
                 self.keep(self.to_keep.pop(0))
 
     def _do(self, todo):
+        # Zeros that follow each other are written before the rules get the results.
+        zeros = []
         for action in todo:
             self.done.append(action)
+            if zeros and not (
+                isinstance(action, actions.WriteTwist) and action.twist.is_zero
+            ):
+                self._report(zeros)
             match action:
                 case actions.SendToDisplay(message):
                     self.messages.append(message)
@@ -139,7 +145,9 @@ class Bench:
                     write = Written(self.now, key, twist, epoch, by)
                     log.append(write)
                     self.attempts.append(write)
-                    self.handle(events.TwistWritten(key, twist, epoch, by, out))
+                    zeros.append(events.TwistWritten(key, twist, epoch, by, out))
+                    if not twist.is_zero:
+                        self._report(zeros)
                 case actions.SendGoal(_, robot, id, x, y, yaw, by, _, until):
                     self.now += self.held_up
                     out = self.clear and self.now <= until
@@ -147,6 +155,11 @@ class Bench:
                 case actions.CutLink(url):
                     self.up = False
                     self.handle(events.LinkDown(url, "control"))
+        self._report(zeros)
+
+    def _report(self, results):
+        while results:
+            self.handle(results.pop(0))
 
     def keep(self, latch):
         """Finish a write to the disk and report the result."""

@@ -6,9 +6,10 @@ import threading
 
 import pytest
 
+from equipment.gate_harness import Bench
 from webmap.gate import pipe as pipe_module
 from webmap.gate.pipe import BackgroundHandler, PipeWriter, Unpacker
-from webmap.gate.protocol import FromGate, GateUp, Ready, Tick
+from webmap.gate.protocol import FromGate, GateUp, Ready, SentTwist, Tick
 
 
 @pytest.fixture
@@ -43,10 +44,13 @@ class TestOutbox:
     ):
         monkeypatch.setattr(pipe_module, "FULL", -1)
         box = PipeWriter(pipe[1])
+        bench = Bench().begin()
         box.put(Tick(1, {}))
+        box.put(SentTwist("r1", 0.0, 0.0, 0.0, None))
+        box.put(bench.report())
         box.put(Ready(1))
         box.close(5.0)
-        assert received(pipe[0]) == [Ready(1)]
+        assert received(pipe[0]) == [bench.report(), Ready(1)]
 
     def test_an_overfull_outbox_drops_every_message(self, pipe, monkeypatch):
         monkeypatch.setattr(pipe_module, "OVERFULL", -1)

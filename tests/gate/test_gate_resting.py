@@ -146,6 +146,39 @@ def test_stop_all_of_very_many_robots_makes_few_reports_before_their_zeros():
     assert all(bench.report(f"s{n}").latched for n in range(MANY))
 
 
+def test_a_stopped_robot_is_reported_beside_many_robots_in_control(monkeypatch):
+    monkeypatch.setattr(machines, "SLICE", 1)
+    others = [spec(id=f"s{n}", twist_topic=key(n).topic) for n in range(10)]
+    bench = Bench().begin(spec(odometry_topic="/odom"), *others)
+    for number in range(10):
+        take = commands.Take(f"s{number}")
+        bench.handle(protocol.FromProgram(take, request=number))
+    assert all(bench.report(f"s{number}").holder for number in range(10))
+    bench.send("a", op="stop", robot="r1")
+    bench.run(2.5)
+    assert bench.report().stop.confirmed is False
+
+
+def test_the_second_zeros_of_stop_all_are_spread_too(steps):
+    others = [spec(id=f"s{n}", twist_topic=key(n).topic) for n in range(MANY)]
+    bench = Bench().begin(spec(), *others)
+    bench.send("a", op="stop", robot="*")
+    bench.now += 0.08  # the gate needed this time for the first ones
+    steps.clear()
+    bench.run(0.01)
+    assert len(steps) <= SLICE
+
+
+def test_the_zeros_of_any_number_of_stopped_robots_come_in_time(monkeypatch):
+    monkeypatch.setattr(machines, "SLICE", 1)
+    bench = stopped_fleet(40)
+    begun = bench.now
+    bench.run(1.0)
+    for number in range(40):
+        zeros = [w.at for w in bench.since(begun) if w.key == key(number)]
+        assert 9 <= len(zeros) <= 11
+
+
 def test_motion_of_a_stopped_robot_ends_the_confirmation_at_once():
     bench = Bench().begin(spec(odometry_topic="/odom"))
     bench.send("a", op="stop", robot="r1")

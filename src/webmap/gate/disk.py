@@ -111,11 +111,13 @@ class Records:
         """Return whose STOP file may have another stamp now, by one listing."""
         listed: dict[str, Stamp | None] = {}
         try:
-            for path in self._folder.iterdir():
-                if ".stop" in path.name:
-                    listed[path.name] = _stamp(path)
+            for name in os.listdir(self._folder):
+                if ".stop" in name:
+                    listed[name] = _stamp(self._folder / name)
         except OSError:  # each file may be there nevertheless
             return list(stamps)
+        if not listed:
+            return [key for key, stamp in stamps.items() if stamp is not None]
         found = {
             key: next(filter(None, map(listed.get, _stops_of(key))), None)
             for key in stamps

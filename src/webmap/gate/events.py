@@ -91,7 +91,7 @@ class PingAnswered:
 
 @dataclass(frozen=True, slots=True)
 class TwistWritten:
-    """A ``WriteTwist`` was done or dropped; comes before any other event."""
+    """A ``WriteTwist`` was done or dropped; comes before any event of another kind."""
 
     key: Key
     twist: Twist

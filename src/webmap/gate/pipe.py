@@ -15,7 +15,7 @@ from typing import Any
 import msgspec
 
 from webmap.base.errors import WireError
-from webmap.gate.protocol import FromGate, RobotReport, SentTwist, Tick
+from webmap.gate.protocol import FromGate, SentTwist, Tick
 
 log = logging.getLogger("webmap.gate")
 
@@ -103,11 +103,14 @@ class PipeWriter:
         self._thread.start()
 
     def put(self, message: FromGate) -> None:
-        """Queue a message; of a full queue, those that are soon repeated are lost."""
+        """Queue a message; of a full queue, those that newer ones replace are lost.
+
+        A report is repeated only when it changes, so none is lost.
+        """
         waiting = self._queue.qsize()
         if waiting > OVERFULL:
             return
-        if waiting > FULL and isinstance(message, Tick | RobotReport | SentTwist):
+        if waiting > FULL and isinstance(message, Tick | SentTwist):
             return
         self._queue.put(pack(message))
 

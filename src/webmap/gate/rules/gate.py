@@ -2,7 +2,8 @@
 
 The shell calls :meth:`Gate.handle` for each event and :meth:`Gate.step` every 10 ms,
 and executes the returned actions in order. It reports the result of a write as another
-event before it does anything else.
+event before it does anything else; those of zeros that follow each other come after all
+of these zeros.
 """
 
 import logging

@@ -155,14 +155,16 @@ class Machine:
 
     def next_step(self, now: float) -> float:
         """Return when :meth:`step` is due, after a step or an event at ``now``."""
-        at_rest = min(self.due_at, self.motion.zero_at, now + HELD_PERIOD)
-        return at_rest if self.rests else -math.inf
+        if not self.rests:
+            return -math.inf
+        before = math.inf if self.due_at == -math.inf else self.due_at
+        return min(before, self.motion.zero_at, now + HELD_PERIOD)
 
     def shown(self, now: float) -> tuple[object, ...]:
         """Return what reports show of a machine that rests and no event reports."""
         seen, sight = self.active_stop.confirmation, self.observation
         return (
-            (seen.confirmed, seen.why, self.obedience.alarm(now)),
+            (self.state, seen.confirmed, seen.why, self.obedience.alarm(now)),
             (sight.echoed, sight.shown(now), self.motion.owes_zero),
             (self.other_writer.seen, self.other_writer.nodes),
             *(goals.report for goals in self.robots.goals.values()),

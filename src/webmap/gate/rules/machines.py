@@ -38,8 +38,9 @@ and the next one comes late."""
 REPORTS = 3000
 """The most reports in a second on machines that rest, if the verdicts do not change."""
 
-SLICE = 200
-"""The most machines that rest in one step: those of 1,000 within 50 ms."""
+SLICE, PARTS = 200, 8
+"""The most machines that rest in one step, and in how many steps all of them step at
+the latest: those of 1,000 within 50 ms, and any number within the time of a zero."""
 
 _due_at = attrgetter("due_at")
 
@@ -223,7 +224,7 @@ class Machines:
         due = [m for m in machines if m in self._awake and m.due_at <= now]
         due.sort(key=_due_at)
         busy = bisect_right(due, -math.inf, key=_due_at)
-        return due[: busy + SLICE]
+        return due[: busy + max(SLICE, len(self._awake) // PARTS)]
 
     def _cut_stalled(self, now: float) -> None:
         """Close stalled control links, and note the oldest answer of the others.
@@ -242,12 +243,14 @@ class Machines:
     def report(self, now: float) -> None:
         """Send a report on each robot whose machine may have changed."""
         touched, self._touched = self._touched, set()
-        for number, key in enumerate(touched):
+        resting = 0
+        for key in touched:
             machine = self._by_key.get(key)
             if machine is None:
                 continue
             self._sort(machine, now)
-            if number >= SLICE and machine.rests:  # first the zeros of STOP ALL
+            resting += machine.rests
+            if machine.rests and resting > SLICE:  # first the zeros of STOP ALL
                 self._later.add(key)
                 continue
             machine.reported, machine.reported_at = machine.shown(now), now
