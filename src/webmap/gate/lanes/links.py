@@ -54,8 +54,9 @@ class Links:
             of_url = frames.setdefault(zero.key.url, {})
             of_url[zero.key] = self._base_frame(zero.key)
         done: set[Key] = set()
-        for url in frames.keys() & self._control.keys():
-            done.update(self._control[url].write_zeros(frames[url]))
+        for url, of_url in frames.items():
+            if url in self._control:
+                done.update(self._control[url].write_zeros(of_url))
         return [
             TwistWritten(zero.key, ZERO, zero.epoch, zero.by, zero.key in done)
             for zero in zeros
