@@ -1,10 +1,12 @@
 """Addresses of routers and agents, users, and the access rules of the router."""
 
+import socket
+import tempfile
 from pathlib import Path
 
 import pytest
 
-from webmap.agents import address
+from webmap.agents import address, router
 from webmap.agents.router import (
     access_rules,
     open_router,
@@ -89,21 +91,37 @@ def test_an_agent_sends_as_itself_and_a_display_as_its_user(users):
     assert access_rules(read_users(users))["default_permission"] == "deny"
 
 
-@pytest.mark.parametrize("port", [0, 1])
-def test_the_passwords_are_in_a_file_of_this_user_alone_until_zenoh_has_read_them(
-    users, port
-):
-    settings = router_settings(f"tcp/127.0.0.1:{port}", read_users(users))
+def test_the_passwords_are_in_a_file_of_this_user_alone(users):
+    settings = router_settings("tcp/127.0.0.1:1", read_users(users))
     file = Path(settings["transport"]["auth"]["usrpwd"]["dictionary_file"])
     assert file.read_text() == "bay3:one\nwest:two\n"
     assert file.stat().st_mode & 0o077 == 0
-    if port:
-        settings["listen"]["endpoints"] = ["tcp/256.0.0.1:1"]
+    file.unlink()
+
+
+def test_the_passwords_are_deleted_when_zenoh_has_read_them(
+    users, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    session, place = open_router("tcp/127.0.0.1:0", read_users(users))
+    assert not list(tmp_path.glob("webmap-router-*"))
+    with pytest.raises(ConfigError, match=f"cannot listen on {place}"):
+        open_router(place, read_users(users))
+    assert not list(tmp_path.glob("webmap-router-*"))
+    session.close()
+
+
+def test_a_router_takes_another_free_port_if_its_own_was_taken_meanwhile(monkeypatch):
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        taken = f"tcp/127.0.0.1:{other.getsockname()[1]}"
+        places = [taken, router.free_port("tcp/127.0.0.1:0")]
+        monkeypatch.setattr(router, "free_port", lambda _listen: places.pop(0))
+        session, place = open_router("tcp/127.0.0.1:0", None)
+        session.close()
+        assert place != taken
+        monkeypatch.setattr(router, "free_port", lambda _listen: taken)
         with pytest.raises(ConfigError, match="cannot listen on"):
-            open_router(settings)
-    else:
-        open_router(settings).close()
-    assert not file.exists()
+            open_router("tcp/127.0.0.1:0", None)
 
 
 @pytest.mark.parametrize(

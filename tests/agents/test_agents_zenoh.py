@@ -10,12 +10,7 @@ import pytest
 from webmap.agents import address
 from webmap.agents.gate_messages import MOST_SAMPLE
 from webmap.agents.peer import Peer
-from webmap.agents.router import (
-    free_port,
-    open_router,
-    read_users,
-    router_settings,
-)
+from webmap.agents.router import free_port, open_router, read_users
 from webmap.agents.router_access import RouterUser
 from webmap.base.errors import WireError
 
@@ -43,10 +38,9 @@ drives = ["bay3"]
 @contextmanager
 def router(listen="tcp/127.0.0.1:0", users=None, **options):
     """Run a router in this process; yield its locator."""
-    settings = router_settings(listen, users, **options)
-    session = open_router(settings)
+    session, place = open_router(listen, users, **options)
     try:
-        yield settings["listen"]["endpoints"][0]
+        yield place
     finally:
         session.close()
 

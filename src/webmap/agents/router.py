@@ -155,17 +155,39 @@ def router_settings(
     return settings
 
 
-def open_router(settings: dict[str, Any]) -> "zenoh.Session":
+def open_router(
+    listen: str, users: Mapping[str, UserEntry] | None, **options: Any
+) -> "tuple[zenoh.Session, str]":
     """Run a router in this process, until its session is closed.
 
+    Another program may take the free port that port 0 became, so the router then tries
+    two others.
+
     Args:
-        settings: What :func:`router_settings` returned. The file with the passwords is
-            deleted as soon as Zenoh has read it.
+        listen: The locator to listen on.
+        users: The users; None lets everybody in.
+        **options: The other arguments of :func:`router_settings`.
+
+    Returns:
+        The session, and the locator with its port.
 
     Raises:
-        ConfigError: If Zenoh is not installed, or the router cannot listen.
+        ConfigError: As :func:`router_settings`, or if Zenoh is not installed, or the
+            router cannot listen.
 
     """
+    attempts = 3 if locator(listen).endswith(":0") else 1
+    while True:
+        settings = router_settings(listen, users, **options)
+        attempts -= 1
+        try:
+            return _opened(settings), settings["listen"]["endpoints"][0]
+        except ConfigError:
+            if not attempts:
+                raise
+
+
+def _opened(settings: dict[str, Any]) -> "zenoh.Session":
     passwords = settings["transport"].get("auth", {}).get("usrpwd")
     try:
         config = zenoh_config(**settings)
@@ -178,7 +200,7 @@ def open_router(settings: dict[str, Any]) -> "zenoh.Session":
             text = str(error).partition(" at /")[0]
             raise ConfigError(f"the router cannot listen on {place}: {text}") from None
     finally:
-        if passwords is not None:
+        if passwords is not None:  # Zenoh has read them
             Path(passwords["dictionary_file"]).unlink()
 
 

@@ -193,19 +193,17 @@ def router(
     from pathlib import Path
 
     from webmap.agents.address import url
-    from webmap.agents.router import open_router, read_users, router_settings
+    from webmap.agents.router import open_router, read_users
 
     known = None if users is None else read_users(Path(users))
-    settings = router_settings(
+    session, place = open_router(
         listen,
         known,
         certificate=certificate or "",
         key=key or "",
         insecure_lan=insecure_lan,
     )
-    session = open_router(settings)
     try:
-        (place,) = settings["listen"]["endpoints"]
         echo(f"The router is ready at {url(place)}")
         sys.stdout.flush()
         if with_parent:
