@@ -19,9 +19,11 @@ from webmap.gate.lanes import control, links, odometry, rosbridge
 from webmap.gate.lanes.sockets import Socket
 from webmap.gate.rules import machines
 from webmap.gate.rules.machine import Machine
-from webmap.gate.rules.machines import SLICE
 
-MANY = 300
+MANY, SLICE = 30, 20
+"""The robots of a large fleet, and of how many the zeros are written in one step; the
+gate itself takes ten times as many."""
+
 STILL = events.OdometryReceived(KEY, ZERO)
 
 
@@ -38,6 +40,11 @@ def stopped_fleet(robots=MANY):
     bench.send("a", op="reset", robot="r1")
     bench.run(3.0)
     return bench
+
+
+@pytest.fixture(autouse=True)
+def small_slices(monkeypatch):
+    monkeypatch.setattr(machines, "SLICE", SLICE)
 
 
 @pytest.fixture
