@@ -20,6 +20,7 @@ from webmap.discovery.doctor.measure import observe
 pytestmark = pytest.mark.slow
 
 SECONDS = 0.4
+"""How long a site is listened to, in tests that run among those of time."""
 STAMPED = "geometry_msgs/msg/TwistStamped"
 TOPICS = {
     f"/{name}/{topic}": type
@@ -208,6 +209,7 @@ BOB = {
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])
+@pytest.mark.serial
 def test_a_configured_robot_is_measured_by_its_configured_topics(dialect):
     seen = looked_at(site(dialect), ConfiguredRobot("Bob", BOB))
     assert (
@@ -220,6 +222,7 @@ def test_a_configured_robot_is_measured_by_its_configured_topics(dialect):
     ]
 
 
+@pytest.mark.serial
 def test_configured_robots_are_measured_without_rosapi():
     seen = looked_at(site(rosapi=False), ConfiguredRobot("Bob", BOB))
     assert [robot.name for robot in seen.findings.robots] == ["Bob"]
@@ -232,6 +235,7 @@ def test_configured_robots_are_measured_without_rosapi():
     )
 
 
+@pytest.mark.serial
 def test_a_configured_topic_without_messages_is_wrong():
     seen = looked_at(
         site(), ConfiguredRobot("Bob", {**BOB, "odometry": (("/odometer", ""),)})
@@ -239,6 +243,7 @@ def test_a_configured_topic_without_messages_is_wrong():
     assert finding_with(seen, "No message was received on /odometer").level == "wrong"
 
 
+@pytest.mark.serial
 def test_without_configured_robots_all_discovered_robots_are_measured():
     seen = looked_at(site())
     assert [robot.name for robot in seen.findings.robots] == ["robot_0"]
@@ -246,6 +251,7 @@ def test_without_configured_robots_all_discovered_robots_are_measured():
     assert finding_with(seen, "robots found: robot_0.").level == "good"
 
 
+@pytest.mark.serial
 def test_the_frame_path_starts_at_the_configured_map_frame():
     received = {**BOB, "tf": (("/tf", ""),)}
     seen = looked_at(site(), ConfiguredRobot("Bob", received, map_frame="site"))
