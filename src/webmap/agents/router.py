@@ -181,13 +181,13 @@ def open_router(
         settings = router_settings(listen, users, **options)
         attempts -= 1
         try:
-            return _opened(settings), settings["listen"]["endpoints"][0]
+            return _open_session(settings), settings["listen"]["endpoints"][0]
         except ConfigError:
             if not attempts:
                 raise
 
 
-def _opened(settings: dict[str, Any]) -> "zenoh.Session":
+def _open_session(settings: dict[str, Any]) -> "zenoh.Session":
     passwords = settings["transport"].get("auth", {}).get("usrpwd")
     try:
         config = zenoh_config(**settings)

@@ -147,7 +147,7 @@ THROTTLE = 50
 """Milliseconds between two messages at least."""
 
 BUSY_PING = 0.05
-"""Seconds between pings while anything is watched that does not rest."""
+"""Seconds between pings while a machine is watched that does not rest."""
 
 
 class OdometryLane:

@@ -161,7 +161,7 @@ class Machine:
         return min(before, self.motion.zero_at, now + HELD_PERIOD)
 
     def shown(self, now: float) -> tuple[object, ...]:
-        """Return what reports show of a machine that rests and no event reports."""
+        """Return the values of reports that change without an event for the machine."""
         seen, sight = self.active_stop.confirmation, self.observation
         return (
             (self.state, seen.confirmed, seen.why, self.obedience.alarm(now)),

@@ -32,11 +32,11 @@ from webmap.gate.specs import check_twist_type, checked, key_of
 log = logging.getLogger("webmap.gate")
 
 RESTING_INTERVAL = 0.75 * INTERVAL
-"""The same for a machine that rests: its steps are not 100 ms apart to the millisecond,
-and the next one comes late."""
+"""Seconds between two reports on a machine that rests, if only numbers change. It is
+shorter than the time between two of its steps, so that each step may report."""
 
 REPORTS = 3000
-"""The most reports in a second on machines that rest, if the verdicts do not change."""
+"""The most reports a second on all machines that rest, if no verdict changes."""
 
 SLICE, PARTS = 200, 8
 """The most machines that rest in one step, and in how many steps all of them step at
@@ -193,8 +193,8 @@ class Machines:
         """Do what is due for each active machine, and close stalled control links.
 
         A report takes longer than a step. A machine that rests, as all do after STOP
-        ALL, is reported when the verdict on the STOP changes, and now and then when the
-        report has other news.
+        ALL, is reported at once when the verdict on the STOP changes, and less often
+        when other values of its report change.
         """
         early = now - max(RESTING_INTERVAL, len(self._awake) / REPORTS)
         for machine in self._due(now):
@@ -217,8 +217,8 @@ class Machines:
     def _due(self, now: float) -> list[Machine]:
         """Return the machines whose step is due: first those that do not rest.
 
-        After STOP ALL the zeros of all machines are due at once. Each step writes a
-        part of them, the most late first, so that no step takes long.
+        After STOP ALL the zeros of all machines are due at once. One call returns a
+        part of these machines, the most late ones first, so that no step takes long.
         """
         machines = self._by_key.values()
         due = [m for m in machines if m in self._awake and m.due_at <= now]
