@@ -70,6 +70,72 @@ def test_an_open_list_in_the_dock_does_not_cover_the_selected_robot(
             summary.click()
 
 
+PLACES = """() => {
+  const robots = [...document.querySelectorAll(".robot:not(.unplaced)")];
+  const places = robots.map((robot) => robot.getScreenCTM());
+  return places.map(({ e, f }) => [Math.round(e), Math.round(f)]);
+}"""
+"""Where the robots are, in pixels of the window."""
+
+TURNS = (
+    ".tools summary:has-text('Layers')",
+    ".tools summary:has-text('Alerts')",
+    "#panel-turn",
+)
+"""What opens and closes parts beside the map."""
+
+
+def turn(page: Page, part: str) -> list[list[int]]:
+    """Open or close a part of the page; return where the robots are then."""
+    page.locator(part).click()
+    page.wait_for_timeout(300)
+    return page.evaluate(PLACES)
+
+
+def test_the_robots_stay_where_they_are_when_panels_open_and_close(open_console):
+    page = open_console()
+    page.set_viewport_size(WIDE)
+    page.wait_for_timeout(300)
+    places = page.evaluate(PLACES)
+    assert len(places) == ROBOTS
+    for part in TURNS:
+        assert turn(page, part) == places, part
+        assert turn(page, part) == places, part
+
+
+def test_the_view_moves_as_little_as_possible_to_uncover_the_robot_and_back(
+    open_console,
+):
+    page = open_console()
+    page.set_viewport_size(WIDE)
+    select(page, "Robot 1")
+    map = page.locator("svg.webmap").bounding_box()
+    x, y = page.locator(".robot.selected").evaluate(
+        "r => (({ e, f }) => [e, f])(r.getScreenCTM())"
+    )
+    # To where the dock covers the robot.
+    page.mouse.move(map["x"] + 300, map["y"] + 20)
+    page.mouse.down()
+    right = map["x"] + map["width"] - 100
+    page.mouse.move(map["x"] + 300 + right - x, map["y"] + 20, steps=4)
+    page.mouse.up()
+    before = page.evaluate(PLACES)
+    opened = turn(page, TURNS[0])
+    assert page.evaluate(ROBOT) == "free"
+    dock = page.locator(".webmap-layers .webmap-tool-body").bounding_box()
+    for (x, y), (was_x, was_y) in zip(opened, before, strict=True):
+        assert y == was_y
+        assert 0 < was_x - x < right - dock["x"] + 60
+    assert turn(page, TURNS[0]) == before
+    # Not back if somebody has moved the view meanwhile.
+    opened = turn(page, TURNS[0])
+    page.locator("svg.webmap").focus()
+    page.get_by_role("button", name="Zoom in").click()
+    zoomed = page.evaluate(PLACES)
+    assert zoomed != opened
+    assert turn(page, TURNS[0]) == zoomed
+
+
 def width_of_panel(page: Page) -> float:
     return page.evaluate(SIZE, "#panel")[0]
 

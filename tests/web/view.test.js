@@ -2,6 +2,7 @@ import assert from "node:assert/strict";
 import test from "node:test";
 
 import {
+  adapt,
   LARGEST,
   SMALLEST,
   apply,
@@ -9,7 +10,6 @@ import {
   initialView,
   isView,
   multiply,
-  resize,
   rotate,
   scale,
   scaleOf,
@@ -78,15 +78,48 @@ test("a rotation is counter-clockwise on the screen", () => {
   near(apply(turned, 1, 0), { x: 0, y: -1 });
 });
 
-test("the point in the centre stays when the size changes", () => {
+/** A place of a map on a page; only some values matter. */
+const place = (left, top, width, height, window = "1440 900") => ({
+  left,
+  top,
+  width,
+  height,
+  window,
+});
+
+test("with another size of the window the middle stays in the middle", () => {
   repeat(() => {
     const view = someView();
-    const before = { width: between(1, 2000), height: between(1, 2000) };
-    const after = { width: between(1, 2000), height: between(1, 2000) };
+    const before = place(300, 40, between(1, 2000), between(1, 2000));
+    const after = place(300, 40, between(1, 2000), between(1, 2000), "800 600");
     const world = unapply(view, before.width / 2, before.height / 2);
     const middle = { x: after.width / 2, y: after.height / 2 };
-    near(apply(resize(view, before, after), world.x, world.y), middle);
+    near(apply(adapt(view, before, after, false), world.x, world.y), middle);
   });
+});
+
+test("beside a panel that opens the map shows everything at the same place", () => {
+  const [view, before] = [someView(), place(300, 40, 1100, 800)];
+  const point = unapply(view, 500, 200); // at 800, 240 of the page
+  for (const after of [
+    place(300, 40, 700, 800), // a panel at the right
+    place(500, 40, 900, 800), // a panel at the left
+    place(300, 140, 1100, 700), // a notice above
+  ]) {
+    const { x, y } = apply(adapt(view, before, after, false), point.x, point.y);
+    near({ x: x + after.left, y: y + after.top }, { x: 800, y: 240 });
+  }
+});
+
+test("the middle stays for a followed robot, a first size and a scrolled part", () => {
+  const [view, before] = [someView(), place(300, 40, 1100, 800)];
+  const after = place(500, 40, 900, 800);
+  const centred = translate(view, -100, 0);
+  assert.deepEqual(adapt(view, before, after, true), centred);
+  const scrolled = place(300, -400, 900, 800);
+  assert.deepEqual(adapt(view, before, scrolled, false), centred);
+  const first = adapt(view, place(0, 0, 0, 0), after, false);
+  assert.deepEqual(first, translate(view, 450, 400));
 });
 
 test("fit shows the whole rectangle, as large as possible and centred", () => {

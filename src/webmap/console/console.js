@@ -35,10 +35,10 @@ export default function attach(map, options, send) {
     listenToHelp(map.drive, signal),
     listenToPalette(map.drive, signal),
     listenToPanel(map, signal),
-    keepInView(map),
   ];
   listenToTools(map, options, signal);
   listenToList(map, signal);
+  keepInView(map, signal);
   listenToSheet(signal);
   return {
     destroy() {

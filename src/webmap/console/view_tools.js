@@ -1,5 +1,5 @@
 import { byId } from "../web/tools/elements.js";
-import { rotate } from "../web/view.js";
+import { rotate, translate } from "../web/view.js";
 
 /** @typedef {import('../web/view.js').Matrix} Matrix */
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
@@ -179,25 +179,44 @@ const PLACES = 600;
 const PATIENCE = 1500;
 
 /**
- * Keep a visible selected robot in view when the map's place on the page becomes
- * smaller, as when a list is opened in the dock. A map keeps its middle when its size
- * changes.
+ * Keep a visible selected robot in view when a panel, a tool or the camera opens beside
+ * or over the map: move the view as little as possible, and back when it is closed,
+ * unless somebody has moved the view since.
  *
  * @param {MapCanvas} map
- * @returns {() => void} Ends it.
+ * @param {AbortSignal} signal Ends it.
  */
-export function keepInView(map) {
+export function keepInView(map, signal) {
+  let area = map.svg.getBoundingClientRect();
   let [width, height] = [map.width, map.height];
-  const observer = new ResizeObserver(() => {
-    const [x, y] = placeOfSelected(map) ?? [Number.NaN, Number.NaN];
-    const wasSeen =
-      Math.abs(x - map.width / 2) < width / 2 && Math.abs(y - map.height / 2) < height / 2;
-    const smaller = map.width < width || map.height < height;
+  /** By how much the view was moved to uncover the robot, in pixels. */
+  let [x, y] = [0, 0];
+  const check = () => {
+    const before = area;
+    area = map.svg.getBoundingClientRect();
     [width, height] = [map.width, map.height];
-    if (smaller && wasSeen && map.selected) show(map, map.selected);
+    if (map.following || !map.selected) return;
+    const [left, top] = placeOnScreen(map, map.selected) ?? [Number.NaN, Number.NaN];
+    if (x !== 0 || y !== 0) map.setView(translate(map.view, -x, -y));
+    const { e, f } = map.view;
+    const across = left > before.left && left < before.right;
+    if (across && top > before.top && top < before.bottom) show(map, map.selected);
+    [x, y] = [map.view.e - e, map.view.f - f];
+  };
+  const off = map.onView(() => {
+    // With another size of the map, the map has adapted the view.
+    if (map.width === width && map.height === height) [x, y] = [0, 0];
   });
-  observer.observe(map.svg);
-  return () => observer.disconnect();
+  const sizes = new ResizeObserver(check);
+  sizes.observe(map.svg);
+  const panels = new MutationObserver(check);
+  panels.observe(document.body, { attributeFilter: ["data-camera"] });
+  document.addEventListener("toggle", check, { signal, capture: true });
+  signal.addEventListener("abort", () => {
+    off();
+    sizes.disconnect();
+    panels.disconnect();
+  });
 }
 
 /**
@@ -232,40 +251,61 @@ function waitForCard(map, robot, until, signal) {
 }
 
 /**
+ * Move the map as little as possible so that nothing covers a robot.
+ *
  * @param {MapCanvas} map
  * @param {string} robot
  */
 function show(map, robot) {
-  const element = map.world.querySelector(
-    `.robot:not(.unplaced)[data-robot="${CSS.escape(robot)}"]`,
-  );
-  if (element) map.crowd.draw(element);
-  const place = element instanceof SVGGraphicsElement ? element.getScreenCTM() : null;
-  if (!place || map.following || isFree(map, [place.e, place.f])) return;
-  const free = nearest(map);
-  if (!free) return;
-  const [x, y] = free;
-  const { view } = map;
-  const moved = { ...view, e: view.e + x - place.e, f: view.f + y - place.f };
-  map.setView(moved);
+  const place = placeOnScreen(map, robot);
+  if (!place || map.following || isFree(map, place)) return;
+  const free = nearest(map, place);
+  if (free) map.setView(translate(map.view, free[0] - place[0], free[1] - place[1]));
 }
 
 /**
  * @param {MapCanvas} map
- * @returns {Point | undefined} The uncovered point that is nearest to the map's middle.
+ * @param {string} robot
+ * @returns {Point | null} Where the robot is drawn; null if it has no place.
  */
-function nearest({ svg }) {
+function placeOnScreen(map, robot) {
+  const element = map.world.querySelector(
+    `.robot:not(.unplaced)[data-robot="${CSS.escape(robot)}"]`,
+  );
+  if (!(element instanceof SVGGraphicsElement)) return null;
+  map.crowd.draw(element);
+  const matrix = element.getScreenCTM();
+  return matrix && [matrix.e, matrix.f];
+}
+
+/**
+ * @param {MapCanvas} map
+ * @param {Point} place
+ * @returns {Point | undefined} The uncovered point that is nearest to a place.
+ */
+function nearest({ svg }, place) {
   const { left, top, width, height } = svg.getBoundingClientRect();
-  const middle = /** @type {Point} */ ([left + width / 2, top + height / 2]);
-  /** @type {Point[]} */
-  const places = [];
   const step = Math.max(APART, Math.sqrt((width * height) / PLACES));
-  for (let x = left + CLEAR; x < left + width; x += step) {
-    for (let y = top + CLEAR; y < top + height; y += step) places.push([x, y]);
-  }
-  const far = (/** @type {Point} */ [x, y]) => Math.hypot(x - middle[0], y - middle[1]);
-  places.sort((one, other) => far(one) - far(other));
-  return places.find((place) => isFree({ svg }, place));
+  const [columns, rows] = [steps(place[0], left, width, step), steps(place[1], top, height, step)];
+  const points = columns.flatMap((x) => rows.map((y) => /** @type {Point} */ ([x, y])));
+  const far = (/** @type {Point} */ [x, y]) => Math.hypot(x - place[0], y - place[1]);
+  points.sort((one, other) => far(one) - far(other));
+  return points.find((point) => isFree({ svg }, point));
+}
+
+/**
+ * @param {number} place
+ * @param {number} first
+ * @param {number} size
+ * @param {number} step
+ * @returns {number[]} Candidates along one axis: the place itself if it is far enough
+ *     from the edges, or the nearest such place, and places at regular distances.
+ */
+function steps(place, first, size, step) {
+  const [low, high] = [first + CLEAR + 1, first + size - CLEAR - 1];
+  const found = [Math.max(low, Math.min(place, high))];
+  for (let each = low; each < high; each += step) found.push(each);
+  return found;
 }
 
 /**

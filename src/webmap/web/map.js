@@ -2,6 +2,7 @@ import { Crowd } from "./crowd.js";
 import { LayoutParts } from "./layout_parts.js";
 import { contentSize } from "./sizes.js";
 import {
+  adapt,
   apply,
   FarPictures,
   Following,
@@ -11,7 +12,6 @@ import {
   isView,
   operated,
   Operations,
-  resize,
   translate,
   unapply,
   ViewReports,
@@ -79,7 +79,8 @@ export class MapCanvas {
     this.crowd = new Crowd(this);
 
     this._setSize(size);
-    const { width, height } = contentSize(svg);
+    this._place = placeOf(svg);
+    const { width, height } = this._place;
     /** Pixels across. */
     this.width = width;
     /** Pixels down. */
@@ -334,10 +335,12 @@ export class MapCanvas {
   }
 
   _resized() {
-    const [before, after] = [{ width: this.width, height: this.height }, contentSize(this.svg)];
-    if (before.width === after.width && before.height === after.height) return;
-    Object.assign(this, after);
-    this._change(resize(this._view, before, after));
+    const [before, after] = [this._place, placeOf(this.svg)];
+    this._place = after;
+    const { width, height } = after;
+    if (before.width === width && before.height === height) return;
+    Object.assign(this, { width, height });
+    this._change(adapt(this._view, before, after, this.following !== 0));
     if (this._sized) this._operations.goOn();
     this._following.settle(this._followedPlace());
     this.reportSoon();
@@ -385,6 +388,20 @@ export class MapCanvas {
       applied: this._operations.applied,
     });
   }
+}
+
+/**
+ * @param {SVGSVGElement} svg
+ * @returns {import('./view.js').Place}
+ */
+function placeOf(svg) {
+  const { left, top } = svg.getBoundingClientRect();
+  return {
+    left: left + scrollX,
+    top: top + scrollY,
+    ...contentSize(svg),
+    window: `${innerWidth} ${innerHeight}`,
+  };
 }
 
 /** Most milliseconds between the end of a drag and its click. */

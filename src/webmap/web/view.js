@@ -154,16 +154,36 @@ export function fit(view, [x0, y0, x1, y1], width, height, margin = 24) {
 }
 
 /**
- * Adapt the view to a new size of the map: the middle stays in the middle.
+ * The map's place on the page, in pixels of the page, and the size of the window.
+ *
+ * @typedef {object} Place
+ * @property {number} left
+ * @property {number} top
+ * @property {number} width
+ * @property {number} height
+ * @property {string} window
+ */
+
+/**
+ * Adapt the view to a new place of the map. What the map shows stays at the same place
+ * of the page when a panel beside the map opens or closes; with a new size of the
+ * window, the middle of the map stays in the middle.
  *
  * @param {Matrix} view
- * @param {{width: number, height: number}} before
- * @param {{width: number, height: number}} after
+ * @param {Place} before
+ * @param {Place} after
+ * @param {boolean} centred Whether the middle stays in the middle in any case.
  * @returns {Matrix}
  */
-export function resize(view, before, after) {
-  const [x, y] = [after.width - before.width, after.height - before.height];
-  return translate(view, x / 2, y / 2);
+export function adapt(view, before, after, centred) {
+  const [wider, higher] = [after.width - before.width, after.height - before.height];
+  const [x, y] = [before.left - after.left, before.top - after.top];
+  // A map that moved further than its edges was scrolled in a part of the page.
+  const far = Math.abs(x) > Math.abs(wider) + 1 || Math.abs(y) > Math.abs(higher) + 1;
+  if (centred || far || before.window !== after.window || before.width === 0) {
+    return translate(view, wider / 2, higher / 2);
+  }
+  return translate(view, x, y);
 }
 
 /**
