@@ -3,6 +3,7 @@ import { describe, test } from "node:test";
 
 import {
   ANSWER_PATIENCE,
+  linesOf,
   Obedience,
   STAND_PATIENCE,
   StopResults,
@@ -106,6 +107,64 @@ describe("a STOP", () => {
     stopping.report(report(), 60_000);
     assert.equal(stopping.verdicts(robots, true, 61_000).length, 1);
     assert.equal(stopping.verdicts(robots, true, 66_000).length, 0);
+  });
+});
+
+describe("the results of STOP ALL for many robots", () => {
+  const ids = Array.from({ length: 30 }, (_, number) => `r${number}`);
+  const robots = new Map(ids.map((robot) => [robot, report({ robot, name: robot })]));
+
+  /** Stop all at time 0; all but some have stopped at `at`. */
+  function stopped(at, moving = []) {
+    const stopping = new StopResults();
+    stopping.start("*", robots, 0);
+    for (const [robot, each] of robots) {
+      if (!moving.includes(robot)) stopping.report(each, at);
+    }
+    return stopping;
+  }
+
+  const texts = (verdicts) => linesOf(verdicts).map(({ text }) => text);
+
+  test("are one line with their number", () => {
+    const [line, ...others] = linesOf(stopped(200).verdicts(robots, true, 300));
+    assert.deepEqual(line, { state: "confirmed", text: "30 of 30 stopped, confirmed" });
+    assert.deepEqual(others, []);
+  });
+
+  test("name only robots whose STOP is not confirmed, and keep the number", () => {
+    const stopping = stopped(200, ["r7"]);
+    for (const now of [ANSWER_PATIENCE + 1, 60_000]) {
+      assert.deepEqual(texts(stopping.verdicts(robots, true, now)), [
+        "29 of 30 stopped, confirmed",
+        "r7: NOT CONFIRMED: no answer from the gate",
+      ]);
+    }
+    stopping.report(robots.get("r7"), 60_000);
+    assert.equal(stopping.verdicts(robots, true, 64_000).length, 30);
+    stopping.verdicts(robots, true, 66_000);
+    assert.deepEqual(stopping.verdicts(robots, true, 66_000), []);
+  });
+
+  test("are not named while the robots still may stop", () => {
+    const lines = linesOf(stopped(200, ids.slice(10)).verdicts(robots, true, 250));
+    assert.deepEqual(lines, [{ state: "stopping", text: "10 of 30 stopped, confirmed" }]);
+  });
+
+  test("name eight robots, and count the others", () => {
+    const lines = texts(stopped(200, ids).verdicts(robots, true, 5000));
+    assert.equal(lines.length, 10);
+    assert.equal(lines[0], "0 of 30 stopped, confirmed");
+    assert.equal(lines.at(-1), "22 more, 22 NOT CONFIRMED");
+  });
+
+  test("name a robot whose stop hook failed", () => {
+    const failed = "stop hook /e_stop: refused";
+    const hooked = new Map(robots).set("r3", report({ name: "r3", hooks: [failed] }));
+    assert.deepEqual(texts(stopped(200).verdicts(hooked, true, 300)), [
+      "30 of 30 stopped, confirmed",
+      `r3: stopped, confirmed by odometry; ${failed}`,
+    ]);
   });
 });
 

@@ -1,7 +1,7 @@
 import { MAY_MOVE } from "../../web/constants.js";
 import { devicesOf } from "../../web/inputs/devices.js";
 import { isLatched, stopKey, stopOf } from "../../web/motion/report.js";
-import { Obedience, standingStops } from "../../web/motion/stops.js";
+import { Obedience, linesOf, standingStops } from "../../web/motion/stops.js";
 import {
   button,
   html,
@@ -172,12 +172,13 @@ class Stop {
 
   /** @param {Verdict[]} verdicts */
   _showVerdicts(verdicts) {
-    const shown = JSON.stringify(verdicts);
+    const lines = linesOf(verdicts);
+    const shown = JSON.stringify(lines);
     if (shown === this._shown) return;
     this._shown = shown;
     this._verdicts.replaceChildren(
-      ...verdicts.map(({ name, state, text }) => {
-        const item = html("p", "webmap-stop-verdict", {}, `${name}: ${text}`);
+      ...lines.map(({ state, text }) => {
+        const item = html("p", "webmap-stop-verdict", {}, text);
         item.dataset.state = state;
         return item;
       }),

@@ -22,6 +22,14 @@ export const STAND_PATIENCE = 1000;
 /** How long a confirmed result is shown, in ms. */
 const SHOWN = 5000;
 
+/** With more results than this, only the exceptions are named. */
+const FEW = 3;
+
+/** The greatest number of exceptions that are named. */
+const NAMED = 8;
+
+const STOPPED = "stopped, confirmed by odometry";
+
 /**
  * The result of the STOP of one robot.
  *
@@ -123,11 +131,14 @@ export class StopResults {
    * @returns {Verdict[]}
    */
   verdicts(robots, connected, now) {
+    const isOver = (/** @type {Watch} */ { stoppedAt }) => connected && stoppedAt !== null && now - stoppedAt > SHOWN;
+    const watches = [...this._watched];
+    // The number of confirmed robots among many is shown as long as one is missing.
+    const each = watches.length <= FEW || watches.every(([, watch]) => isOver(watch));
     const verdicts = [];
-    for (const [robot, watch] of this._watched) {
+    for (const [robot, watch] of watches) {
       if (robot === ALL && robots.size > 0) continue;
-      const settled = watch.stoppedAt !== null && connected;
-      if (settled && now - Number(watch.stoppedAt) > SHOWN) this._watched.delete(robot);
+      if (each && isOver(watch)) this._watched.delete(robot);
       else verdicts.push(judge(robot, robots.get(robot), watch, connected, now));
     }
     return verdicts;
@@ -216,7 +227,7 @@ function judge(robot, report, watch, connected, now) {
   if (report?.link === "down") return unsure("no connection to the bridge");
   if (watch.stoppedAt !== null) {
     const more = [...besides(report?.stop?.why), ...(report?.hooks ?? [])];
-    const parts = ["stopped, confirmed by odometry", ...more];
+    const parts = [STOPPED, ...more];
     return { robot, name, state: "confirmed", text: parts.join("; ") };
   }
   if (waited <= STAND_PATIENCE) {
@@ -224,6 +235,39 @@ function judge(robot, report, watch, connected, now) {
   }
   if (!report?.measured) return unsure("no odometry");
   return unsure(`still moving at ${linearSpeed(report.measured).toFixed(2)} m/s`);
+}
+
+/**
+ * Return the lines that show the results of STOPs: of many robots their number, and by
+ * name only those that need a look.
+ *
+ * @param {Verdict[]} verdicts In the order of the names.
+ * @returns {Pick<Verdict, 'state' | 'text'>[]}
+ */
+export function linesOf(verdicts) {
+  const line = (/** @type {Verdict} */ { name, state, text }) => ({
+    state,
+    text: `${name}: ${text}`,
+  });
+  if (verdicts.length <= FEW) return verdicts.map(line);
+  const of = (/** @type {Verdict['state']} */ state) =>
+    verdicts.filter((verdict) => verdict.state === state);
+  const [confirmed, unconfirmed] = [of("confirmed"), of("unconfirmed")];
+  /** @type {Verdict['state']} */
+  const settled = confirmed.length > 0 ? "confirmed" : "unconfirmed";
+  const first = {
+    state: of("stopping").length > 0 ? /** @type {const} */ ("stopping") : settled,
+    text: `${confirmed.length} of ${verdicts.length} stopped, confirmed`,
+  };
+  const remarks = confirmed.filter(({ text }) => text !== STOPPED);
+  const exceptions = [...unconfirmed, ...remarks];
+  const named = exceptions.slice(0, NAMED).map(line);
+  const more = exceptions.length - named.length;
+  if (more === 0) return [first, ...named];
+  const rest = unconfirmed.length - NAMED;
+  if (rest <= 0) return [first, ...named, { state: "confirmed", text: `${more} more` }];
+  const last = `${more} more, ${rest} NOT CONFIRMED`;
+  return [first, ...named, { state: "unconfirmed", text: last }];
 }
 
 /**
