@@ -10,7 +10,7 @@ import os
 
 import webmap
 from benchmarks.stamped import topics
-from webmap.core.base_page import Viewer
+from webmap.core.operators import Viewer
 from webmap.server.runner import serve
 
 bridge = webmap.Bridge(os.environ["BRIDGED_URL"])

@@ -23,7 +23,9 @@ from webmap.gate.protocol import (
     Heartbeat,
     Hello,
     Holder,
+    Identity,
     Ready,
+    Rename,
     RobotGone,
     RobotSpec,
     Speeds,
@@ -99,6 +101,25 @@ def test_a_page_and_its_commands_reach_the_gate(west):
 def test_a_display_can_declare_no_robot_and_send_nothing_else(west, message):
     with pytest.raises(WireError, match="display west: got no message"):
         west.send(message)
+
+
+def test_a_new_name_of_a_page_does_not_connect_it_again(west):
+    west.connects(ANN)
+    west.connects(msgspec.structs.replace(ANN, speeds=(1.0, 2.0)))
+    eva = msgspec.structs.replace(ANN, name="Eva", speeds=(1.0, 2.0))
+    assert west.connects(eva) == [Rename("west/c1", "Eva")]
+    ben = msgspec.structs.replace(eva, name="Ben", speeds=(2.0, 2.0))
+    assert west.connects(ben) == [
+        Rename("west/c1", "Ben"),
+        Speeds("west/c1", 2.0, 2.0),
+    ]
+    assert len(west.connects(msgspec.structs.replace(ben, role="viewer"))) == 2
+
+
+def test_a_display_cannot_pretend_to_be_a_person_of_another_one(west):
+    page = msgspec.structs.replace(ANN, person="ben", page="p1")
+    (connect,) = west.connects(page)
+    assert connect.identity == Identity("west/ben", "p1")
 
 
 def test_a_display_uses_only_connections_of_its_own(west):
@@ -410,8 +431,9 @@ def test_a_command_and_a_list_have_a_greatest_size(west):
     with pytest.raises(WireError, match="got a command of"):
         west.send(long)
     name = "\U0001f916" * gate_messages.MOST_NAME
+    who = ("91c2b3a4f5", "0b7e0b7e0b")
     pages = [
-        PageState(f"c{number:05}.12345", name, "operator", (0.5, 0.5), False)
+        PageState(f"c{number:05}.12345", name, "operator", (0.5, 0.5), False, *who)
         for number in range(gate_messages.MOST_PAGES)
     ]
     assert len(west.connects(*pages)) == 1 + 2 * len(pages)

@@ -29,9 +29,11 @@ from webmap.gate.protocol import (
     GateDown,
     Hello,
     Holder,
+    Identity,
     Ready,
     Refused,
     RefusedCount,
+    Rename,
     RobotGone,
     RobotReport,
     RobotSpec,
@@ -106,6 +108,17 @@ def connected(bench):
     bench.receive(Hello(PAGE.connection))
     bench.receive(AllReports((), ()))
     return bench
+
+
+def test_a_new_name_and_the_identity_of_a_page_reach_the_agent(connected):
+    who = Identity("91c2", "p1")
+    connected.far.send(Connect(f"{NAME}/c2", "Ben", "operator", identity=who))
+    connected.far.beat(0.0)
+    (connect,) = connected.arrive()
+    assert connect.identity == Identity(f"{NAME}/91c2", "p1")
+    connected.far.send(Rename(f"{NAME}/c2", "Eva"))
+    connected.far.beat(0.0)
+    assert connected.arrive() == [Rename(f"{NAME}/c2", "Eva")]
 
 
 def test_the_first_sample_introduces_the_pages_and_no_robot(bench):

@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from webmap import Map, Robot
-from webmap.core.base_page import PageEntry, Viewer
+from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer
 from webmap.core.page import Page
 from webmap.features.cameras.camera import CameraFeed
 from webmap.features.cameras.camera_panel import (

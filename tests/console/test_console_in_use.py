@@ -7,7 +7,8 @@ import pytest
 
 from webmap import Bridge, Map, Robot, RobotConfig
 from webmap.console import make_robot
-from webmap.core.base_page import PageEntry, Viewer
+from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer
 from webmap.core.page import Page
 from webmap.discovery import discover
 from webmap.discovery.doctor import BridgeFacts

@@ -7,7 +7,8 @@ import pytest
 
 from webmap import Map, Robot
 from webmap.console.page import MARGIN, Frame, Layout
-from webmap.core.base_page import PageEntry, Viewer
+from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer
 from webmap.core.page import Page
 from webmap.scene.wire.session import SceneSession
 

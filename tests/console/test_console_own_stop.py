@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from webmap.console.card_parts import NOBODY_KNOWS, OwnStop, bound
+from webmap.gate.protocol import Holder
 
 
 def report(**changes):
@@ -15,7 +16,7 @@ def report(**changes):
         "v": 2.0,
         "brake": 0.5,
         "test": None,
-        "holder": SimpleNamespace(connection="c1", name="Ann"),
+        "holder": Holder("c1", "Ann"),
     }
     return SimpleNamespace(report=SimpleNamespace(**(known | changes)))
 

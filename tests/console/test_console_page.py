@@ -10,7 +10,8 @@ from webmap.base.errors import ConfigError
 from webmap.console import Console, make_robot, open_console
 from webmap.console.page import build
 from webmap.console.robot_list import RobotList
-from webmap.core.base_page import PageEntry, Viewer
+from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer
 from webmap.core.page import Page, site
 from webmap.scene.element import Element
 from webmap.scene.wire.session import SceneSession

@@ -9,6 +9,7 @@ import pytest
 
 from webmap.base.errors import ConfigError, WireError
 from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer
 from webmap.core.page import Page
 
 
@@ -67,13 +68,6 @@ class Channel:
         return [call[1] for call in self.calls if call[0] == "error"]
 
 
-@dataclass(frozen=True)
-class Someone:
-    id: str = "v1"
-    name: str = "Ann"
-    role: str = "operator"
-
-
 class Publisher:
     def __init__(self) -> None:
         self.images: list[str] = []
@@ -104,7 +98,9 @@ def channel() -> Channel:
 @pytest.fixture
 def page(channel: Channel, publisher: Publisher, tmp_path: Path) -> Page:
     entry = PageEntry("/", lambda page: None, None, tmp_path, "test")
-    return Page(entry, channel, Someone(), publisher, {"webmap_container": (700, 500)})
+    return Page(
+        entry, channel, Viewer("v1", "Ann"), publisher, {"webmap_container": (700, 500)}
+    )
 
 
 @pytest.fixture

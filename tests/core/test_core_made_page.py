@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from webmap import Map
-from webmap.core.base_page import PageEntry, Viewer
+from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer
 from webmap.core.page import Page
 from webmap.scene.wire.session import SceneSession
 

@@ -10,10 +10,10 @@ import pytest
 from webmap.base.geometry import Twist
 from webmap.console.robot_looks import GROUPS, LOOKS
 from webmap.core.robot_state import STATE_TEXTS, Facts, state_of
-from webmap.gate.protocol import MAY_MOVE, Activity
+from webmap.gate.protocol import MAY_MOVE, Activity, Holder
 
 MOVES = (0.4, 0.0, 0.0)
-ANN = SimpleNamespace(connection="c2", name="Ann")
+ANN = Holder("c2", "Ann")
 
 
 REPORT = {
@@ -71,8 +71,8 @@ def test_the_text_of_a_state_names_the_operator(doing, text, mine):
 
 
 def test_an_operator_without_a_name_is_named_after_the_connection():
-    holder = SimpleNamespace(connection="c7", name="")
-    assert state_of(robot("driven", holder=holder)).text == "c7 is driving"
+    holder = Holder("c7", "")
+    assert state_of(robot("driven", holder=holder)).text == "C7 is driving"
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import httpx
 
-from webmap.core.base_page import Viewer
+from webmap.core.operators import Viewer
+from webmap.gate.protocol import Identity
 from webmap.server.app import WebApp
 from webmap.server.page_socket import PageSocket
 from webmap.server.runner import listen, make_server
@@ -84,6 +85,7 @@ class FakeDrive:
     role: str
     send: Callable[[str], None]
     end: Callable[[str], None]
+    identity: Identity | None = None
     received: list[str] = field(default_factory=list)
     speeds: tuple[float, float] | None = None
     times_closed: int = 0
@@ -93,6 +95,9 @@ class FakeDrive:
 
     def set_speeds(self, v: float, w: float) -> None:
         self.speeds = (v, w)
+
+    def rename(self, name: str) -> None:
+        self.name = name
 
     def close(self) -> None:
         self.times_closed += 1
@@ -105,8 +110,8 @@ class FakeGate:
     def __call__(self, *args) -> FakeDrive:
         return self.connect(*args)
 
-    def connect(self, name, role, send, close) -> FakeDrive:
-        connection = FakeDrive(name, role, send, close)
+    def connect(self, name, role, send, close, identity) -> FakeDrive:
+        connection = FakeDrive(name, role, send, close, identity)
         self.connections.append(connection)
         return connection
 

@@ -3,10 +3,11 @@
 from collections.abc import Iterator
 
 import pytest
-from module_fakes import Channel, Link, Someone
+from module_fakes import Channel, Link
 
 from webmap import Map, Robot
 from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer
 from webmap.core.page import Page
 
 
@@ -23,7 +24,7 @@ def channel() -> Channel:
 @pytest.fixture
 def page(channel, tmp_path) -> Iterator[Page]:
     entry = PageEntry("/", lambda page: None, None, tmp_path, "test")
-    page = Page(entry, channel, Someone(), None, {})
+    page = Page(entry, channel, Viewer("v1", "Ann"), None, {})
     yield page
     page.close()
 

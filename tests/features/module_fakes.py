@@ -108,13 +108,6 @@ class Channel:
         return lambda *args, **options: None
 
 
-@dataclass(frozen=True)
-class Someone:
-    id: str = "v1"
-    name: str = "Ann"
-    role: str = "operator"
-
-
 def header(frame: str = "map", *, ros2: bool = False) -> dict:
     """Return a header in one of the dialects."""
     if ros2:

@@ -521,3 +521,17 @@ class TestLifecycle:
 
     def test_ending_a_heartbeat_that_never_started_raises_no_error(self):
         GateClient()._supervisor.end_heartbeat()
+
+
+def test_a_page_learns_who_it_is_and_its_new_name(client, gate):
+    who, texts = protocol.Identity("91c2", "0b7e"), []
+    page = client.connect("Ann", "operator", texts.append, print, identity=who)
+    gate.deliver(protocol.Hello(page.id))
+    page.rename("\u05e8")
+    page.rename("\u05e8")
+    assert gate.of(protocol.Rename) == [protocol.Rename(page.id, "\u05e8")]
+    hello, *you = map(json.loads, texts)
+    assert hello["op"] == "hello"
+    names = ["Ann", "\u2068\u05e8\u2069"]
+    expected = {"op": "you", "person": "91c2", "page": "0b7e"}
+    assert you == [expected | {"name": name} for name in names]

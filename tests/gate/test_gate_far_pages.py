@@ -15,10 +15,13 @@ from webmap.gate.protocol import (
     GateDown,
     Hello,
     Holder,
+    Identity,
     Ready,
+    Rename,
     RobotGone,
     RobotReport,
     Speeds,
+    StopReport,
     TakeReply,
     Tick,
 )
@@ -136,6 +139,26 @@ def test_a_report_names_the_agent_and_this_page_by_its_own_id(bench):
     assert (message["gate"], message["mine"]) == ("bay3", True)
     assert message["holder"]["connection"] == "c7"
     assert message["asker"]["connection"] == "ben.5e/c1.1"
+
+
+def test_a_person_is_recognized_in_a_report_of_an_agent(bench):
+    held = msgspec.structs.replace(
+        REPORT,
+        holder=Holder(bench.id, "Ann", Identity(f"{PREFIX}91c2", "p1")),
+        asker=AskerReport("ben.5e/c1.1", "Ben", 5.0, Identity("ben.5e/91c2", "p2")),
+        stop=StopReport("\u05e8", True, "", "s1", Identity(f"{PREFIX}91c2", "p1")),
+    )
+    (message,) = bench.receive(held)
+    assert message["holder"]["identity"] == {"person": "91c2", "page": "p1"}
+    assert message["asker"]["identity"]["person"] == "ben.5e/91c2"
+    assert message["stop"]["identity"]["person"] == "91c2"
+    assert message["stop"]["by"] == "\u2068\u05e8\u2069"
+
+
+def test_the_agent_gets_a_new_name_once(bench):
+    bench.page.rename("Eva")
+    bench.page.rename("Eva")
+    assert bench.link.sent[1:] == [Rename(bench.id, "Eva")]
 
 
 def test_the_hello_of_an_agent_is_not_for_the_page_but_its_robots_are(bench):

@@ -20,13 +20,13 @@ import selectors
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 from webmap import Map, Robot
 from webmap.base.errors import ProtocolError
 from webmap.base.scope import Removal, current_scope, keep, no_scope
 from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer
 from webmap.core.page import Page
 from webmap.ros.bridge import BridgeStats
 from webmap.ros.rosbridge.protocol import Protocol
@@ -191,7 +191,7 @@ class Stage(logging.Handler):
             robot.add_module(Seer, self.note)
         self.robot = self.robots[0]
         entry = PageEntry("/", lambda page: None, None, Path(), "test")
-        someone = SimpleNamespace(id="v1", name="Ann", role="operator")
+        someone = Viewer("v1", "Ann")
         self.page = Page(entry, Channel(self.note), someone, None, {})
         map = Map(self.page.element("map"), 700, 500)
         for robot in self.robots:

@@ -7,7 +7,8 @@ import threading
 import time
 from pathlib import Path
 
-from webmap.core.base_page import PageEntry, Viewer
+from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer
 from webmap.core.runtime import Runtime
 from webmap.server.files import Published
 from webmap.server.open_pages import OpenPages

@@ -2,7 +2,7 @@ import pytest
 
 from equipment.server_fakes import TOKEN
 from webmap.base.errors import ConfigError
-from webmap.core.base_page import Viewer
+from webmap.core.operators import Viewer
 from webmap.server.access import (
     AccessControl,
     AccessRefusal,

@@ -9,7 +9,7 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.websockets import WebSocketDisconnect
 
 from equipment.server_fakes import TOKEN, FakePage, key_in
-from webmap.core.base_page import Viewer
+from webmap.core.operators import Viewer
 from webmap.core.pictures import pictures
 from webmap.server.access import Settings
 from webmap.server.app import WebApp

@@ -11,7 +11,7 @@ from page_loop import begin_page, make_model, open_page, wait_for
 
 import webmap
 from webmap.base.errors import ConfigError
-from webmap.core.base_page import Viewer
+from webmap.core.operators import Viewer
 from webmap.server import open_pages as host_module
 
 

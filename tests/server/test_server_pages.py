@@ -12,9 +12,9 @@ from page_loop import ANN, HELLO, make_model, objects_left, open_page, wait_for
 import webmap
 from webmap.base.errors import MotionError
 from webmap.base.scope import Removal, keep
-from webmap.core.base_page import Viewer
 from webmap.core.frame_pace import FramePace
 from webmap.core.layer import Layer
+from webmap.core.operators import Viewer
 from webmap.features.layers.laser_scanner import LaserScanner, SweepMsg
 from webmap.ros.rosbridge.events import Publish
 from webmap.server import open_pages as host_module

@@ -8,6 +8,7 @@ import socket as sockets
 from urllib.parse import urlencode
 
 import pytest
+from starlette.websockets import WebSocket
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.frames import Frame, Opcode
@@ -16,7 +17,7 @@ from equipment.server_fakes import TOKEN, running, wait_for
 from webmap.server.access import Settings
 from webmap.server.app import WebApp
 from webmap.server.page_socket import OPENS_AT_ONCE, REPLACED, TOO_SOON
-from webmap.server.sockets import MOST_STOP_ONLY
+from webmap.server.sockets import MOST_STOP_ONLY, place_of
 
 TICK = '{"op":"tick","tick":%d,"ack":-1}'
 
@@ -619,3 +620,38 @@ def test_the_token_is_in_no_log_and_no_answer_of_the_server(rooms, server, caplo
     assert b"server:" not in answer.lower()
     assert TOKEN.encode() not in answer
     assert TOKEN not in caplog.text
+
+
+def test_the_gate_gets_the_name_and_the_identity_of_a_page(rooms, open_socket):
+    async def scenario():
+        async with open_socket("drive?id=p1"), open_socket("drive?id=p2"):
+            await asyncio.to_thread(wait_for, lambda: len(rooms.gate.connections) == 2)
+            return list(rooms.gate.connections)
+
+    one, other = asyncio.run(scenario())
+    assert one.name == other.name == "an operator at WebMap's computer (no name)"
+    assert one.identity.person == other.identity.person
+    assert one.identity.page != other.identity.page
+    assert not one.identity.verified
+
+
+@pytest.mark.parametrize(
+    ("client", "headers", "place"),
+    [
+        ("127.0.0.1", {}, "WebMap's computer"),
+        ("::1", {}, "WebMap's computer"),
+        ("127.0.0.1", {"x-forwarded-for": "10.0.0.5"}, ""),
+        ("127.0.0.1", {"forwarded": "for=10.0.0.5"}, ""),
+        ("::ffff:10.0.0.5", {}, "10.0.0.5"),
+        ("fe80::1%eth0", {}, "fe80::1"),
+        ("testclient", {}, ""),
+        (None, {}, ""),
+    ],
+)
+def test_a_browser_is_where_its_address_is_unless_a_proxy_hides_it(
+    client, headers, place
+):
+    pairs = [(name.encode(), value.encode()) for name, value in headers.items()]
+    scope = {"type": "websocket", "headers": pairs, "path": "/", "query_string": b""}
+    scope["client"] = client and (client, 1)
+    assert place_of(WebSocket(scope, None, None)) == place

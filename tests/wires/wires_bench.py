@@ -49,7 +49,7 @@ class Bench:
 
     def __enter__(self):
         from equipment.server_fakes import running
-        from webmap.core.base_page import Viewer
+        from webmap.core.operators import Viewer
 
         def authenticate(scope):
             headers = dict(scope["headers"])

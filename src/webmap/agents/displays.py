@@ -15,6 +15,7 @@ from collections import deque
 from collections.abc import Mapping
 
 import msgspec
+from msgspec.structs import replace
 
 from webmap.agents.gate_messages import (
     HEAD_BYTES,
@@ -38,7 +39,9 @@ from webmap.gate.protocol import (
     FromPage,
     FromProgram,
     Hello,
+    Identity,
     Ready,
+    Rename,
     RobotGone,
     RobotReport,
     Role,
@@ -362,10 +365,10 @@ class Displays:
                     continue  # it may stop robots, and nothing else
             state = self._state(display, connection, page)
             display.pages[connection] = state
-            if known is None or known[0] != state[0]:
+            if known is None:
                 changed += state
-            elif known[1:] != state[1:]:
-                changed += state[1:]
+            elif known != state:
+                changed += _changes(known, state)
             elif not page.greeted and connection in self._greeted:
                 changed.append(Hello(connection))  # the first was lost
         if room < 0:
@@ -380,7 +383,11 @@ class Displays:
         most = self._roles.get(user_of(display.name), self._roles.get("", "viewer"))
         role = min(page.role, most, key=order.index)
         program = connection == display.program
-        state: list[Connect | Speeds] = [Connect(connection, page.name, role, program)]
+        who = None
+        if page.person:  # no display can name a person of another one
+            who = Identity(f"{display.name}/{page.person}", page.page)
+        hello = Connect(connection, page.name, role, program, who)
+        state: list[Connect | Speeds] = [hello]
         if page.speeds is not None:
             state.append(Speeds(connection, *page.speeds))
         return state
@@ -392,6 +399,22 @@ class Displays:
         del display.pages[connection]
         self._greeted.discard(connection)
         return Disconnect(connection)
+
+
+def _changes(
+    known: list[Connect | Speeds], state: list[Connect | Speeds]
+) -> list[Effect]:
+    """Return what the gate gets when the state of a page has changed.
+
+    A new name alone must not connect the page again, as that would end its control.
+    """
+    was, now = known[0], state[0]
+    assert isinstance(was, Connect)
+    assert isinstance(now, Connect)
+    if replace(was, name=now.name) != now:
+        return [*state]
+    renamed = [Rename(now.connection, now.name)] if was != now else []
+    return [*renamed, *(state[1:] if known[1:] != state[1:] else ())]
 
 
 def user_of(display: str) -> str:

@@ -114,6 +114,9 @@ class PageState(msgspec.Struct, frozen=True, array_like=True):
     """The speed limits of its ``Teleop``, in m/s and rad/s."""
     greeted: bool = True
     """Whether the display has received its :class:`Hello`."""
+    person: Annotated[str, msgspec.Meta(max_length=16)] = ""
+    """The parts of its identity; empty for a program."""
+    page: Annotated[str, msgspec.Meta(max_length=16)] = ""
 
 
 class SampleAck(msgspec.Struct, frozen=True, tag="answer", omit_defaults=True):

@@ -51,16 +51,20 @@ class PageConnection:
         role: Role,
         send: Callable[[str], None],
         close: Callable[[str], None],
+        identity: protocol.Identity | None = None,
     ) -> None:
         self._gates = gates
         self._name = name
+        self._identity = identity
         self._role: Role = role
         self._send = send
         self._close = close
         self._speeds: tuple[float, float] | None = None
         self._remote: dict[str, DriveConnection] = {}
         self._greeted = False
-        self._own = gates.own.connect(name, role, self._from_own, close)
+        self._own = gates.own.connect(
+            name, role, self._from_own, close, identity=identity
+        )
 
     def receive(self, text: str | bytes) -> None:
         """Pass a frame of the page to the gate of its robot, a STOP for all to all."""
@@ -88,6 +92,12 @@ class PageConnection:
         for connection in (self._own, *self._remote.values()):
             connection.set_speeds(v, w)
 
+    def rename(self, name: str) -> None:
+        """Show the person at the page under another name; see ``DriveConnection``."""
+        self._name = name
+        for connection in (self._own, *list(self._remote.values())):
+            connection.rename(name)
+
     def close(self) -> None:
         """Remove the page, which has closed; the robots that it drove stop."""
         self._gates.drop(self)
@@ -97,7 +107,12 @@ class PageConnection:
     def join(self, url: str, client: GateClient) -> None:
         """Connect the page to one more gate."""
         connection = client.connect(
-            self._name, self._role, self._from_remote, self._close, self._own.id
+            self._name,
+            self._role,
+            self._from_remote,
+            self._close,
+            self._own.id,
+            self._identity,
         )
         self._remote[url] = connection
         if self._speeds is not None:
@@ -171,9 +186,10 @@ class Gates:
         role: Role,
         send: Callable[[str], None],
         close: Callable[[str], None],
+        identity: protocol.Identity | None = None,
     ) -> PageConnection:
         """Register a page's socket; see :meth:`GateClient.connect`."""
-        page = PageConnection(self, name, role, send, close)
+        page = PageConnection(self, name, role, send, close, identity)
         with self._lock:
             self._pages.append(page)
             for url, client in self.remote.items():

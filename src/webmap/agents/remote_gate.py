@@ -147,6 +147,11 @@ class RemoteGate:
                     self._pages[connection] = message
                     self._changed = True
                     return
+                case protocol.Rename(connection, name):
+                    page = self._pages[connection]
+                    self._pages[connection] = replace(page, name=name)
+                    self._changed = True
+                    return
                 case protocol.Disconnect(connection):
                     self._pages.pop(connection, None)
                     self._speeds.pop(connection, None)
@@ -276,6 +281,7 @@ class RemoteGate:
                 page.role,
                 self._speeds.get(id),
                 id in self._greeted,
+                *((who.person, who.page) if (who := page.identity) else ()),
             )
             for id, page in list(self._pages.items())[: MOST_PAGES - 1]
         ]

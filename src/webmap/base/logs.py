@@ -32,6 +32,7 @@ LOGGERS = (
     "webmap.modules.labels",
     "webmap.modules.route_tool",
     "webmap.modules.several_robots",
+    "webmap.operators",
     "webmap.page",
     "webmap.robot",
     "webmap.ros",

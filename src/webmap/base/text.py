@@ -4,10 +4,14 @@ Robots, bridges, browsers and files choose this text. A line break in it would f
 line of the log, and an escape sequence would control the terminal.
 """
 
+from unicodedata import bidirectional
+
 LONGEST = 1000
 """Characters of a text that are shown, unless a caller sets another number."""
 
 _CUT = "..."
+
+RIGHT_TO_LEFT = frozenset({"R", "AL", "AN"})
 
 
 def escaped(text: str) -> str:
@@ -47,6 +51,16 @@ def lines_of(text: object, longest: int = LONGEST) -> str:
 
 def _escape(character: str) -> str:
     return character.encode("unicode_escape").decode("ascii")
+
+
+def isolated(name: str) -> str:
+    """Return a name that does not change the direction of the text around it.
+
+    A name in Hebrew or Arabic would otherwise move numbers and brackets beside it.
+    """
+    if name.isascii() or RIGHT_TO_LEFT.isdisjoint(map(bidirectional, name)):
+        return name
+    return f"\u2068{name}\u2069"
 
 
 def counted(number: int, thing: str) -> str:

@@ -15,6 +15,7 @@ from webmap.console.bar import BridgeList, RefusedList
 from webmap.console.card_parts import RobotHealth
 from webmap.console.console import Console
 from webmap.console.floor import Floor, load_floor
+from webmap.console.operator_name import OperatorName
 from webmap.console.robot_card import RobotButtons, RobotCard
 from webmap.console.robot_list import RobotList
 from webmap.console.robot_looks import make_robot
@@ -152,7 +153,7 @@ def build(
     refused = RefusedList(page.element("refused"), page.viewer.role)
     polls = [frame.place, listed.poll, card.poll, cameras.poll, health.poll]
     polls += [opened.bring_back, links.poll, refused.poll, doctor.poll, costmaps.poll]
-    polls.append(alerts.poll)
+    polls += [alerts.poll, map.add_module(OperatorName).poll]
     task = asyncio.get_running_loop().create_task(poll_on(polls))
     page.on_close(task.cancel)
 

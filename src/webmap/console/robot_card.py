@@ -152,10 +152,12 @@ class RobotCard:
         state, report = robot.state, robot.report
         shape, tone, _ = look_of(robot)
         self._shape.show(shape)
-        self._state.text, self._mine.text = state.text, state.mine
+        you = self.map.page.viewer.operator
+        self._state.text, self._mine.text = state.text_for(you.person), state.mine
         self.element.set("data-state", state.name)
         reasons = (report.other_writer, report.reason) if report is not None else ()
-        self._reason.text = " ".join(sentence(each) for each in reasons if each)
+        reason = " ".join(sentence(each) for each in reasons if each)
+        self._reason.text = reason.replace(f"by {you}", "by you")
         self._goal.show(robot)
         self._problems.text = " ".join(map(sentence, robot.problems.values()))
         self.element.set("data-tone", tone or None)

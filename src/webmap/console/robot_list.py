@@ -114,6 +114,7 @@ class Row:
 
     def __init__(self, robot: "Robot", map: "Map") -> None:
         self.robot = robot
+        self._person = map.page.viewer.operator.person
         self._shape = StateShape()
         self._state = html.span(class_="holder")
         self._mine = html.span(class_="you")
@@ -164,8 +165,9 @@ class Row:
         self._shown = shown
         look = LOOKS[now.name]
         self._shape.show(look.symbol)
-        self._state.text, self._mine.text = now.text, now.mine
-        self._words.set("title", now.text)
+        text = now.text_for(self._person)
+        self._state.text, self._mine.text = text, now.mine
+        self._words.set("title", text)
         self._battery.show(charge, robot.battery_low)
         for name, value in {
             "tone": look.tone,

@@ -11,8 +11,8 @@ from webmap.base.errors import ConfigError
 from webmap.base.plain_files import resolved
 from webmap.base.scope import Removal, Scope, current_scope
 from webmap.base.tasks import begin
+from webmap.core.operators import Viewer
 from webmap.core.pictures import Publisher
-from webmap.gate.protocol import Role
 from webmap.scene.document import BoundElement, Document
 from webmap.scene.element import Element, Event, Handler, Listener
 from webmap.scene.node import Fragment
@@ -57,20 +57,6 @@ class PageSpeeds:
         """Remove a module that no longer drives."""
         self._most.pop(id(module), None)
         self.drive(module, False)
-
-
-@dataclass(frozen=True, slots=True)
-class Viewer:
-    """One browser that has signed in; all its pages are one viewer."""
-
-    id: str
-    """Opaque; the same while the browser stays signed in."""
-
-    name: str
-    """The name shown to others when this viewer has control."""
-
-    role: Role = "operator"
-    """What the viewer may do: watch, drive, or administer."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -52,7 +52,8 @@ class Map(WorldView):
         )
 
     def __repr__(self) -> str:
-        return f"<Map of {self.page.viewer.name} with {len(self.robots)} robots>"
+        who = self.page.viewer.operator.logged
+        return f"<Map of {who} with {len(self.robots)} robots>"
 
     # Contents.
 

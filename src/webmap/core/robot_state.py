@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from webmap.base.audience import RARELY, audience
 from webmap.base.geometry import Twist
+from webmap.base.text import isolated
 from webmap.config.robot import BATTERY_LOW
 from webmap.gate.protocol import MAY_MOVE, RobotReport
 from webmap.gate.rules.goals import BRAKES, OVER
@@ -52,6 +53,9 @@ STATE_TEXTS = {
 }
 """The text of each state. Of the states that are true at once, the first one here is
 shown. The page has the same table, generated from this one."""
+
+YOUR_OTHER = "your other page"
+"""Who has control, on the other pages of the same person."""
 
 PRECEDENCE = {name: place for place, name in enumerate(STATE_TEXTS)}
 """The place of each state in the table; the least one has priority."""
@@ -98,6 +102,16 @@ class RobotState(NamedTuple):
 
     mine: str
     """The text for the page that has control of the robot."""
+
+    elsewhere: str
+    """The text for other pages of the person who has control."""
+
+    person: str = ""
+    """The person who has control of the robot; empty for none and for a program."""
+
+    def text_for(self, person: str) -> str:
+        """Return the text for the pages of a person, without control."""
+        return self.elsewhere if person == self.person else self.text
 
 
 class Facts(NamedTuple):
@@ -219,18 +233,28 @@ def _own_motion(facts: Facts) -> str | None:
 def _state(name: str, facts: Facts) -> RobotState:
     report = facts.report
     holder = report.holder if report is not None else None
-    who = holder.name or holder.connection if holder is not None else "Another operator"
-    text = STATE_TEXTS[name]
-    since = since_when(facts.silent_for) if "{since}" in text else ""
-    text = text.format(who=who, since=since)
+    who, person = "Another operator", ""
+    if holder is not None:
+        who = isolated(holder.name or holder.connection)
+        person = holder.identity.person if holder.identity else ""
+    template = STATE_TEXTS[name]
+    since = since_when(facts.silent_for) if "{since}" in template else ""
+    text, elsewhere = (
+        _begun(template.format(who=each, since=since)) for each in (who, YOUR_OTHER)
+    )
     mine = STATE_TEXTS.get(f"{name}_by_you", text)
     if (
         report is not None
         and report.doing in ("stopped", "unconfirmed")
         and PRECEDENCE[name] < PRECEDENCE["unconfirmed"]
     ):  # a worse state does not hide that STOP is active
-        text = mine = f"{text}, {STATE_TEXTS[report.doing]}"
-    return RobotState(name, text, mine)
+        text = mine = elsewhere = f"{text}, {STATE_TEXTS[report.doing]}"
+    return RobotState(name, text, mine, elsewhere, person)
+
+
+def _begun(text: str) -> str:
+    """Return a text that begins with a capital letter."""
+    return f"{text[:1].upper()}{text[1:]}"
 
 
 def _is_quiet(facts: Facts) -> bool:

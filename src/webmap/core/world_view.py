@@ -164,9 +164,9 @@ class WorldView(Extendable):
         self.page: BasePage = page_of(container)
         if self.page.closed:  # the map would never be destroyed
             raise ConfigError(
-                f"page {self.page.entry.path!r} of {self.page.viewer.name} was closed, "
-                "so no map can be created on it: create maps in the page function, not "
-                "in a task that may end after the viewer has left"
+                f"page {self.page.entry.path!r} of {self.page.viewer.operator} was "
+                "closed, so no map can be created on it: create maps in the page "
+                "function, not in a task that may end after the viewer has left"
             )
         self.container = container
         self.selected: object = None

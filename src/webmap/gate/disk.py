@@ -25,6 +25,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 from webmap.base.plain_files import read_file, write_file
 from webmap.gate.actions import SaveStop, SaveStopTest
 from webmap.gate.commands import MAX_ID
@@ -38,6 +40,7 @@ from webmap.gate.events import (
     StopSaved,
     StopTestSaved,
 )
+from webmap.gate.protocol import Identity
 from webmap.ros.names import spellings_of
 
 log = logging.getLogger("webmap.gate")
@@ -151,6 +154,8 @@ class Records:
                 _flush_folder(self._folder)
             else:
                 who = {"by": press.by, "id": press.id}
+                if press.identity is not None:
+                    who["identity"] = msgspec.to_builtins(press.identity)
                 self._write(path, {**who, "bridge": key.url, "topic": key.topic})
                 for each in others:  # otherwise found when this one is lifted
                     each.unlink(missing_ok=True)
@@ -198,18 +203,21 @@ def _press_in(path: Path) -> Press | None:
     """Return the STOP in a file; ``None`` if there is nothing of that name."""
     try:
         found = json.loads(read_file(path, LARGEST, links=False))
-        by, id = found["by"], found.get("id")
+        by, id, identity = found["by"], found.get("id"), found.get("identity")
     except FileNotFoundError:
         return None
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         log.warning("%s cannot be read (%s): STOP is active", path, error)
-        by = id = None
+        by = id = identity = None
     if not (isinstance(by, str) and by and by.isprintable()):
         by = UNKNOWN
     if not (isinstance(id, str) and id and id.isprintable() and len(id) <= MAX_ID):
         # Earlier versions wrote no identity. This one changes with each new file.
         id = "file-" + "-".join(f"{part:x}" for part in _stamp(path) or (0,))
-    return Press(by[:MAX_NAME], id)
+    try:
+        return Press(by[:MAX_NAME], id, msgspec.convert(identity, Identity | None))
+    except msgspec.ValidationError:
+        return Press(by[:MAX_NAME], id)
 
 
 def _stamp(path: Path) -> Stamp | None:

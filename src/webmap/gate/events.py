@@ -7,6 +7,7 @@ from typing import Literal, NamedTuple
 import msgspec
 
 from webmap.base.geometry import Twist
+from webmap.gate.protocol import Identity
 
 Lane = Literal["control", "odometry", "tasks"]
 Outcome = Literal["reached", "failed", "cancelled"]
@@ -19,13 +20,15 @@ class Key(NamedTuple):
     topic: str
 
 
-class Press(NamedTuple):
+class Press(msgspec.Struct, frozen=True, repr_omit_defaults=True):
     """One press of STOP, with an identity of its own."""
 
     by: str
     """The name of who pressed STOP."""
     id: str
     """The identity, which a reset must name."""
+    identity: Identity | None = None
+    """That of the person; None for a program, or if it is unknown."""
 
 
 class ScanFold(msgspec.Struct, frozen=True):

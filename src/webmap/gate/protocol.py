@@ -5,7 +5,7 @@ z up, turn counter-clockwise); times are seconds. The display generates a short 
 id for each robot and for each connection (the socket of one page).
 """
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import msgspec
 
@@ -15,6 +15,22 @@ PROGRAM = "program"
 """The connection of the display's own Python code."""
 
 Role = Literal["viewer", "operator", "admin"]
+
+
+class Identity(
+    msgspec.Struct, frozen=True, omit_defaults=True, repr_omit_defaults=True
+):
+    """The person behind a name, and the page: names may be equal, and may change.
+
+    It only tells pages whose a command was. No decision depends on it.
+    """
+
+    person: Annotated[str, msgspec.Meta(max_length=128)]
+    """The same for all pages of one person."""
+    page: Annotated[str, msgspec.Meta(max_length=32)] = ""
+    verified: bool = False
+    """Whether a sign-in has verified the name of the person."""
+
 
 GoalMethod = Literal["topic", "navigate_to_pose", "move_base"]
 """How goals are sent: as PoseStamped on a topic, to the action of ROS 2, or to that of
@@ -141,6 +157,15 @@ class Connect(
     role: Role
     program: bool = False
     """Whether it is not a page but the Python code of another display."""
+    identity: Identity | None = None
+    """None for a program."""
+
+
+class Rename(msgspec.Struct, frozen=True, tag="rename"):
+    """The person at a page has another name now; nothing else changes."""
+
+    connection: str
+    name: str
 
 
 class Disconnect(msgspec.Struct, frozen=True, tag="disconnect"):
@@ -194,6 +219,7 @@ ToGate = (
     RobotSpec
     | Forget
     | Connect
+    | Rename
     | Disconnect
     | FromPage
     | Speeds
@@ -203,23 +229,29 @@ ToGate = (
 )
 
 
-class Holder(msgspec.Struct, frozen=True):
+class Holder(msgspec.Struct, frozen=True, omit_defaults=True, repr_omit_defaults=True):
     """The connection that has control of a robot, and its name for people."""
 
     connection: str
     name: str
+    identity: Identity | None = None
 
 
-class AskerReport(msgspec.Struct, frozen=True):
+class AskerReport(
+    msgspec.Struct, frozen=True, omit_defaults=True, repr_omit_defaults=True
+):
     """The connection that requests control of a robot from its holder."""
 
     connection: str
     name: str
     left: float
     """Seconds until the request is granted automatically."""
+    identity: Identity | None = None
 
 
-class StopReport(msgspec.Struct, frozen=True):
+class StopReport(
+    msgspec.Struct, frozen=True, omit_defaults=True, repr_omit_defaults=True
+):
     """Who pressed an active STOP, and whether the robot stands."""
 
     by: str
@@ -230,6 +262,8 @@ class StopReport(msgspec.Struct, frozen=True):
     """The reason as text."""
     id: str
     """The identity of the newest press, which a reset must name."""
+    identity: Identity | None = None
+    """That of the person; None for a program, or if it is unknown."""
 
 
 class TestReport(msgspec.Struct, frozen=True):

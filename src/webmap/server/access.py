@@ -7,7 +7,7 @@ from urllib.parse import parse_qsl, quote, urlencode
 
 from starlette.types import Scope
 
-from webmap.core.base_page import Viewer
+from webmap.core.operators import Viewer
 from webmap.server.auth import Attempts, Codes, Token, new_token
 from webmap.server.origins import Hosts, same_origin
 
@@ -296,7 +296,7 @@ class AccessControl:
         session = self._token.session(cookie)
         assert session is not None
         return SignedIn(
-            _viewer(session), self._token.key(session), _set_cookie(request, cookie)
+            Viewer(session), self._token.key(session), _set_cookie(request, cookie)
         )
 
     def _is_own_origin(self, request: RequestHead) -> bool:
@@ -312,11 +312,7 @@ class AccessControl:
 
 
 def _first(sessions: Iterable[str | None]) -> Viewer | None:
-    return next((_viewer(session) for session in sessions if session), None)
-
-
-def _viewer(session: str) -> Viewer:
-    return Viewer(session, f"operator {session[:4]}")
+    return next((Viewer(session) for session in sessions if session), None)
 
 
 def _name(request: RequestHead) -> str:

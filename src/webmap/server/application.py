@@ -10,7 +10,7 @@ from webmap.core.page import site
 from webmap.core.runtime import FRAME_RATE, runtime
 
 if TYPE_CHECKING:
-    from webmap.gate.protocol import Role
+    from webmap.gate.protocol import Identity, Role
     from webmap.server.access import Authenticate
     from webmap.server.app import WebApp
     from webmap.server.open_pages import GateConnection
@@ -237,7 +237,8 @@ def _connect_to_gate(
     role: "Role",
     send: Callable[[str], None],
     close: Callable[[str], None],
+    identity: "Identity",
 ) -> "GateConnection":
     if runtime.gate is None:
         raise WebMapError("WebMap has not been started: call webmap.start()")
-    return runtime.gate.connect(name, role, send, close)
+    return runtime.gate.connect(name, role, send, close, identity=identity)

@@ -17,7 +17,8 @@ from webmap.base.errors import MotionError, WireError
 from webmap.base.geometry import Affine
 from webmap.base.scope import Removal
 from webmap.base.tasks import begin
-from webmap.core.base_page import PageEntry, Viewer
+from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer
 from webmap.core.page import Page
 from webmap.core.pictures import Publisher
 from webmap.core.refusals import refusals
@@ -88,6 +89,9 @@ class GateConnection(Protocol):
     def move(self, robot: str, x: float, y: float, yaw: float) -> None:
         """Send a goal in the name of the page."""
 
+    def rename(self, name: str) -> None:
+        """Show the person at the page under another name from now on."""
+
     def close(self) -> None:
         """Remove the page, which has closed; the robots that it drove stop."""
 
@@ -116,7 +120,7 @@ class PageHost:
         self.drive: GateConnection | None = None
 
     def __repr__(self) -> str:
-        return f"<page {self._entry.path} of {self.viewer.name}>"
+        return f"<page {self._entry.path} of {self.viewer.operator.logged}>"
 
     # From the socket.
 
@@ -391,7 +395,7 @@ class OpenPages:
 
     def count_refused(self, viewer: Viewer, last: str) -> None:
         """Add a refused message to the problems of the system, with its reason."""
-        refusals.note(viewer.name, 1, last, datetime.now(UTC))
+        refusals.note(str(viewer.operator), 1, last, datetime.now(UTC))
 
     def host(self, key: PageKey, viewer: Viewer) -> PageHost:
         """Return the page of that key: the kept one, or a new one."""

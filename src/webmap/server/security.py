@@ -16,7 +16,7 @@ from http import HTTPStatus
 from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from webmap.core.base_page import Viewer
+from webmap.core.operators import Viewer
 from webmap.server.access import (
     AccessControl,
     AccessRefusal,

@@ -10,6 +10,7 @@ go to the gate unread; only the gate decides. A page beyond the limit can only s
 STOP is never refused for lack of room.
 """
 
+import ipaddress
 import logging
 import secrets
 import time
@@ -18,12 +19,13 @@ from dataclasses import replace
 
 from starlette.websockets import WebSocket
 
-from webmap.core.base_page import PageEntry, Viewer
+from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer, operators
 from webmap.core.page import Site
 from webmap.gate.commands import Refusal as InvalidCommand
 from webmap.gate.commands import begins_like_stop, op_of, parse, stop_in
 from webmap.gate.display.pages import refused_text
-from webmap.gate.protocol import Refused, Role
+from webmap.gate.protocol import Identity, Refused, Role
 from webmap.server.open_pages import GateConnection, OpenPages
 from webmap.server.outbox import BatchedCallsByLoop, DriveQueue, FrameQueue
 from webmap.server.page_socket import (
@@ -51,6 +53,25 @@ def find_page(site: Site, path: str) -> PageEntry | None:
     return site.pages.get("/" + path.removeprefix("/"))
 
 
+def place_of(socket: WebSocket) -> str:
+    """Return where the browser of a socket is, for people; empty if a proxy hides it.
+
+    A browser on this machine is named as seen from elsewhere: "this computer" would be
+    the computer of whoever reads it.
+    """
+    host = socket.client.host if socket.client else ""
+    try:
+        address = ipaddress.ip_address(host.partition("%")[0])
+    except ValueError:  # such as a Unix socket
+        return ""
+    if isinstance(address, ipaddress.IPv6Address):
+        address = address.ipv4_mapped or address
+    if not address.is_loopback:
+        return str(address)
+    proxied = "x-forwarded-for" in socket.headers or "forwarded" in socket.headers
+    return "" if proxied else "WebMap's computer"
+
+
 class SceneSockets:
     """The ``/_webmap/scene`` sockets of one application."""
 
@@ -75,7 +96,7 @@ class SceneSockets:
         if page_id is None:
             await close(socket, BROKEN_RULE, "id must be 1 to 64 letters, digits, -, _")
             return
-        name = f"scene of {entry.path} for {viewer.name}"
+        name = f"scene of {entry.path} for {viewer.operator.logged}"
         page_socket = PageSocket(
             socket, name, self._calls.of_this_loop(), SCENE, FrameQueue()
         )
@@ -85,7 +106,8 @@ class SceneSockets:
         async with self._open.holding((viewer.id, page_id), page_socket) as has_room:
             if has_room:
                 hello = socket.query_params.get("hello")
-                await self._carry(page_socket, entry.path, page_id, viewer, hello)
+                with operators.present(viewer, place_of(socket)):
+                    await self._carry(page_socket, entry.path, page_id, viewer, hello)
             else:
                 await page_socket.refuse(COME_BACK, FULL)
 
@@ -116,10 +138,10 @@ class SceneSockets:
 
 
 ConnectToGate = Callable[
-    [str, Role, Callable[[str], None], Callable[[str], None]], GateConnection
+    [str, Role, Callable[[str], None], Callable[[str], None], Identity], GateConnection
 ]
-"""Opens a connection to the gate for a viewer's name and role. The two callbacks send
-to the page and close its socket; they may be called from any thread."""
+"""Opens a connection to the gate for a viewer's name, role and identity. The two
+callbacks send to the page and close its socket; they may be called from any thread."""
 
 MOST_STOP_ONLY = 32
 """The greatest number of pages that can only stop; each new one gets a place."""
@@ -157,18 +179,21 @@ class DriveSockets:
         if page_id is None:
             await close(socket, BROKEN_RULE, "id must be 1 to 64 letters, digits, -, _")
             return
-        name = f"drive for {viewer.name}"
+        name = f"drive for {viewer.operator.logged}"
         page_socket = PageSocket(
             socket, name, self._calls.of_this_loop(), DRIVE, DriveQueue()
         )
         key = (viewer.id, page_id)
+        place = place_of(socket)
         async with self._open.holding(key, page_socket) as has_room:
             if has_room:
-                await self._carry(page_socket, page_id, viewer, limited=named)
+                with operators.present(viewer, place):
+                    await self._carry(page_socket, page_id, viewer, limited=named)
         if not has_room:
             viewer = replace(viewer, role="viewer")
             async with self._stop_only.holding(key, page_socket):
-                await self._carry(page_socket, page_id, viewer, stops_only=True)
+                with operators.present(viewer, place):
+                    await self._carry(page_socket, page_id, viewer, stops_only=True)
         elif not self._open.full:
             self._stop_only.end_oldest("there is a place now: connect again")
 
@@ -182,12 +207,12 @@ class DriveSockets:
         stops_only: bool = False,
     ) -> None:
         try:
-            connection = self._connect(page_socket, viewer)
+            connection = self._connect(page_socket, page_id, viewer)
             if limited:
                 # Until the model, which may be busy, has set the page's speeds.
                 connection.set_speeds(0.0, 0.0)
         except Exception:
-            log.exception("%s cannot reach the gate", viewer.name)
+            log.exception("%s cannot reach the gate", viewer.operator.logged)
             await page_socket.refuse(
                 FAILED, "no connection to the gate; see the log of WebMap"
             )
@@ -213,19 +238,28 @@ class DriveSockets:
                 if begins_like_stop(data) and next(last_stops, None) is not None:
                     connection.receive(message)
 
-            await page_socket.run(
-                receive, lambda why: self._pages.refused(viewer, why), rest
-            )
+            with operators.following(viewer, connection):
+                await page_socket.run(
+                    receive, lambda why: self._pages.refused(viewer, why), rest
+                )
         finally:
             # The gate first: the connection's leases end with it, and robots stop.
             connection.close()
             self._pages.drive_closed(page_id, viewer, connection)
 
-    def _connect(self, page_socket: PageSocket, viewer: Viewer) -> GateConnection:
+    def _connect(
+        self, page_socket: PageSocket, page_id: str, viewer: Viewer
+    ) -> GateConnection:
         def close(reason: str) -> None:
             page_socket.end(BROKEN_RULE, reason)
 
-        return self._connect_to_gate(viewer.name, viewer.role, page_socket.offer, close)
+        return self._connect_to_gate(
+            viewer.operator.label,
+            viewer.role,
+            page_socket.offer,
+            close,
+            operators.identity(viewer, page_id),
+        )
 
 
 def _unless_stop(message: str) -> Refused | None:

@@ -3,11 +3,12 @@
 from pathlib import Path
 
 import pytest
-from module_fakes import Channel, Someone
+from module_fakes import Channel
 
 import webmap
 from webmap import Map
 from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer
 from webmap.core.page import Page
 from webmap.features.alerts.alerts import MOST, AlertPanel, Alerts
 
@@ -29,7 +30,7 @@ class Browser:
         self.attached = []
         channel = Channel()
         channel.attach = lambda *args: self.attached.append(args)
-        self.page = Page(entry, channel, Someone(name, name, role), None, {})
+        self.page = Page(entry, channel, Viewer(name, name, role), None, {})
         self.map = Map(self.page.element("map"), 700, 500)
         self.panel = self.map.add_module(AlertPanel, alerts)
         self.got = []
@@ -112,7 +113,7 @@ def test_an_unknown_alert_is_reported_and_the_others_are_acknowledged(
     ann = open_page()
     ann.panel.on_message({"acknowledge": [*alerts.listed, -1, 10**30]})
     assert ann.problem() == "No longer in the list: 2 of the acknowledged alerts."
-    assert [alert.by for alert in alerts.listed.values()] == ["Ann"]
+    assert [str(alert.by) for alert in alerts.listed.values()] == ["Ann"]
 
 
 def test_a_press_on_the_robot_selects_it_and_moves_it_into_view(open_page, robot):

@@ -7,13 +7,14 @@ import os
 from types import SimpleNamespace
 
 import pytest
-from module_fakes import Channel, Link, Someone, pose
+from module_fakes import Channel, Link, pose
 
 from webmap import Map, Robot
 from webmap.base.geometry import Pose
 from webmap.core import alignment_store
 from webmap.core.alignment_store import AlignmentStore, name_of
 from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer
 from webmap.core.page import Page
 from webmap.poses.alignment import align_bridge, alignments
 
@@ -169,7 +170,7 @@ def test_invalid_alignment_values_are_refused(tool, robot, channel, wrong):
 
 def test_a_viewer_cannot_align_robots(tmp_path, robot, channel, store):
     entry = PageEntry("/", lambda page: None, None, tmp_path, "test")
-    page = Page(entry, channel, Someone(role="viewer"), None, {})
+    page = Page(entry, channel, Viewer("v1", "Ann", "viewer"), None, {})
     map = Map(page.element("map"), 700, 500)
     map.add_robot(robot)
     tool = map.add_module("AlignTool")

@@ -16,6 +16,7 @@ from webmap import Bridge, Robot
 from webmap.base.errors import ConfigError
 from webmap.config.buttons import ButtonMistake, read_button
 from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer
 from webmap.core.page import Page
 from webmap.scene.element import Event
 
@@ -453,7 +454,7 @@ def test_a_viewer_sees_a_disabled_button_and_cannot_press_it(
     link, robot, channel, tmp_path
 ):
     entry = PageEntry("/", lambda page: None, None, tmp_path, "test")
-    viewer = SimpleNamespace(id="v2", name="Vic", role="viewer")
+    viewer = Viewer("v2", "Vic", "viewer")
     page = Page(entry, channel, viewer, None, {})
     module = robot.add_module("Buttons", link, [DOCK])
     with page.scope.active():

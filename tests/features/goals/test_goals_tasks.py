@@ -5,11 +5,12 @@ import math
 from types import SimpleNamespace
 
 import pytest
-from module_fakes import Channel, Someone
+from module_fakes import Channel
 
 from webmap import Bridge, Map, Robot
 from webmap.console.card_parts import GOALS, GoalLine, figures
 from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer
 from webmap.core.page import Page
 from webmap.gate.protocol import GoalReport
 
@@ -144,7 +145,7 @@ class TestRoutes:
 
         def ask_(*messages, role="operator"):
             async def scenario():
-                channel, viewer = Channel(), Someone(role=role)
+                channel, viewer = Channel(), Viewer("v1", "Ann", role)
                 entry = PageEntry("/", lambda page: None, None, tmp_path, "test")
                 page = Page(entry, channel, viewer, None, {})
                 tool = Map(page.element("map"), 700, 500).add_module("RouteTool")

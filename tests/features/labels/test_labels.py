@@ -2,13 +2,13 @@
 
 import asyncio
 import json
-from types import SimpleNamespace
 
 import pytest
 
 from webmap import Map
 from webmap.base.errors import ConfigError
 from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer
 from webmap.core.page import Page
 
 DESK = {"name": "Desk", "x": 1.0, "y": 2.0, "icon": "desk"}
@@ -214,9 +214,7 @@ def test_a_map_added_later_also_shows_the_problem_of_unsaved_labels(
 
 def test_a_viewer_cannot_add_labels(channel, tmp_path, said):
     entry = PageEntry("/", lambda page: None, None, tmp_path, "test")
-    page = Page(
-        entry, channel, SimpleNamespace(id="v", name="V", role="viewer"), None, {}
-    )
+    page = Page(entry, channel, Viewer("v", "V", "viewer"), None, {})
     module = Map(page.element("map"), 700, 500).add_module("Labels")
     module.on_message({"add": DESK})
     assert said == [{"refused": "only operators can add, move and delete labels"}]

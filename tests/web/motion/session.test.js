@@ -258,3 +258,52 @@ describe("a page drives", () => {
     assert.equal(session.drives, false);
   });
 });
+
+describe("a page that knows its person", () => {
+  const ANN = { person: "91c2", page: "p1" };
+  const YOU = { op: "you", name: "Ann (desk 4)", ...ANN };
+  const STOP = { by: "Ann (desk 4)", confirmed: true, why: "", id: "s1" };
+
+  /** @param {object} changes */
+  function report(changes) {
+    session.receive(HELLO, 0);
+    session.receive(YOU, 0);
+    session.receive(structuredClone({ ...REPORT, mine: false, ...changes }), 0);
+    return /** @type {any} */ (session.pilot.robots.get("r1"));
+  }
+
+  test("calls another page of this person so, and no other person", () => {
+    const other = { connection: "c2", name: "Ann (desk 4)", identity: { ...ANN, page: "p2" } };
+    assert.equal(report({ holder: other }).holder.name, "your other page");
+    const eve = { ...other, identity: { person: "77aa", page: "p1" } };
+    assert.equal(report({ holder: eve }).holder.name, "Ann (desk 4)");
+    const asker = { ...other, left: 3 };
+    assert.equal(report({ asker }).asker.name, "your other page");
+    assert.equal(report({ holder: { connection: "c2", name: "Eve" } }).holder.name, "Eve");
+  });
+
+  test("names the STOP of this person, also after another name", () => {
+    assert.equal(report({ stop: { ...STOP, by: "Eva", identity: ANN } }).stop.by, "you");
+    const elsewhere = { ...STOP, identity: { ...ANN, page: "p2" } };
+    assert.equal(report({ stop: elsewhere }).stop.by, "you, on another page");
+    assert.equal(report({ stop: STOP }).stop.by, "Ann (desk 4)");
+  });
+
+  test("says you in the texts of the gate, which are the same for all pages", () => {
+    const reason = "STOP by Ann (desk 4) is active: reset it first";
+    assert.equal(report({ reason }).reason, "STOP by you is active: reset it first");
+    const goal = { id: "g", why: "by Ann (desk 4)", state: "cancelled" };
+    assert.equal(report({ goal }).goal.why, "by you");
+    const refused = { op: "refused", robot: "r1", what: "take", why: "Ann (desk 4) has control" };
+    const [[, told]] = session.receive({ ...refused }, 0).events;
+    assert.equal(/** @type {any} */ (told).why, "your other page has control");
+  });
+
+  test("and gets no identity from an older gate changes nothing", () => {
+    const known = { ...REPORT, stop: { ...STOP, identity: { person: "" } } };
+    session.receive(HELLO, 0);
+    session.receive(structuredClone(known), 0);
+    const [robot] = session.pilot.robots.values();
+    assert.equal(/** @type {any} */ (robot).stop.by, "Ann (desk 4)");
+  });
+});

@@ -114,7 +114,7 @@ test("the title names the operator", () => {
   const odd = { connection: "c2", name: "$& {since}" };
   assert.equal(title({ ...DRIVING, holder: odd }), "$& {since} is driving");
   const nameless = { connection: "c2", name: "" };
-  assert.equal(title({ ...DRIVING, holder: nameless }), "c2 is driving");
+  assert.equal(title({ ...DRIVING, holder: nameless }), "C2 is driving");
 });
 
 test("the detail names the operator if the title does not", () => {

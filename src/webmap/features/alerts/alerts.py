@@ -6,11 +6,12 @@ import logging
 import secrets
 import time
 from collections.abc import Callable, Collection, Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from webmap.base.audience import RARELY, audience
 from webmap.base.lifecycle import lifecycle
+from webmap.core.operators import Operator
 from webmap.core.problems import cut, without_numbers
 from webmap.gate.protocol import MAY_MOVE
 from webmap.poses.silence import PERIODS
@@ -67,8 +68,8 @@ class Alert:
     count: int = 1
     """The number of times it began."""
 
-    by: str | None = None
-    """The name of the viewer who acknowledged it; None until then."""
+    by: Operator | None = None
+    """The viewer who acknowledged it, under the name of then; None until then."""
 
     acknowledged: float | None = None
     """When it was acknowledged; None until then."""
@@ -129,12 +130,12 @@ class Alerts:
             if alert.ended is None and condition not in found:
                 self._end(alert, now)
 
-    def acknowledge(self, id: int, by: str, now: float) -> bool:
+    def acknowledge(self, id: int, by: Operator, now: float) -> bool:
         """Acknowledge an alert; the first viewer who does so stays recorded.
 
         Args:
             id: The id of the alert.
-            by: The name of the viewer.
+            by: The viewer.
             now: Unix seconds.
 
         Returns:
@@ -344,11 +345,15 @@ class AlertPanel:
         self._sent = self._alerts.version
         self.browser_part.send(
             {
-                "alerts": [asdict(alert) for alert in changed],
+                "alerts": [self._shown(alert) for alert in changed],
                 "ids": list(self._alerts.listed),
                 "dropped": self._alerts.dropped,
             }
         )
+
+    def _shown(self, alert: Alert) -> dict[str, Any]:
+        by = alert.by and self.map.page.viewer.calls(alert.by)
+        return asdict(replace(alert, by=None)) | {"by": by}
 
     def on_message(self, message: dict[str, Any]) -> None:
         """Acknowledge alerts, or select the robot of an alert."""
@@ -371,7 +376,7 @@ class AlertPanel:
                 f"Not acknowledged: a list of at most {MOST} numbers of alerts was "
                 f"expected, got {str(ids)[:80]}. Reload the page."
             )
-        now, by = time.time(), self.map.page.viewer.name
+        now, by = time.time(), self.map.page.viewer.operator
         missing = [id for id in ids if not self._alerts.acknowledge(id, by, now)]
         self.poll()
         if not missing:

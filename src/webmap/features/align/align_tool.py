@@ -110,7 +110,7 @@ class AlignTool:
         spawn(self._keep(name, before, pose))
 
     async def _keep(self, name: str, before: Pose | None, pose: Pose) -> None:
-        by = self.map.page.viewer.name
+        by = self.map.page.viewer.operator.logged
         try:
             path = await asyncio.to_thread(store.save, name, before, pose, by)
         except OSError as error:

@@ -73,6 +73,7 @@ class ButtonView:
         button = self.button
         running = button.state == "running"
         why = self._why_disabled()
+        by = self._viewer.calls(button.by)
         self.element.set("data-state", button.state)
         self._press.set(disabled=why is not None)
         self._press.set(title=None if why is None else f"Not available: {why}")
@@ -83,12 +84,13 @@ class ButtonView:
                 limit=button.spec.timeout,
                 age_text=True,
             )
-        self._result.text = _result_text(button, why)
+        self._result.text = _result_text(button, by, why)
 
     def _why_disabled(self) -> str | None:
         if self._viewer.role not in MAY_PRESS:
             return "only operators can press this button"
-        return self.button.why_disabled
+        why, by = self.button.why_disabled, self.button.by
+        return why and why.replace(f"by {by}", f"by {self._viewer.calls(by)}")
 
     async def _pressed(self, event: Event) -> None:
         if self._why_disabled() is not None:
@@ -123,7 +125,8 @@ class ButtonView:
             self._close(self._sheet)
             # The press belongs to the robot: it continues when the page shows another
             # robot.
-            await asyncio.shield(spawn(self.button.press(values, by=self._viewer.name)))
+            by = self._viewer.operator
+            await asyncio.shield(spawn(self.button.press(values, by=by)))
 
     def _open_form(self) -> None:
         self._close(self._question)
@@ -180,10 +183,10 @@ class ButtonView:
             self._form = None
 
 
-def _result_text(button: RobotButton, why: str | None) -> str:
+def _result_text(button: RobotButton, by: str, why: str | None) -> str:
     """Return the text under a button that cannot be pressed because of ``why``."""
     if button.state == "running":
-        return f"Running, started by {button.by}"
+        return f"Running, started by {by}"
     return button.result or (f"Not available: {why}" if why else "")
 
 

@@ -10,6 +10,7 @@ from webmap.base.errors import MotionRefused, ServiceError, WebMapError
 from webmap.base.scope import Removable, Removal, keep
 from webmap.config.buttons import ButtonSpec, motion_of, value_kind
 from webmap.core.motion import robot_motions
+from webmap.core.operators import Operator
 from webmap.ros.bridge import Bridge
 from webmap.ros.definitions import Field
 from webmap.ros.message_forms import checked, fields_of
@@ -44,7 +45,7 @@ class RobotButton:
         self.state: State = "idle"
         self.result = ""
         """The result of the last press; empty before the first."""
-        self.by = ""
+        self.by: Operator | str = ""
         """Who pressed last."""
         self.since = 0.0
         """Time of the last press, in monotonic seconds."""
@@ -80,7 +81,7 @@ class RobotButton:
         """Whether the type is written in the ROS 2 dialect."""
         return (self.spec.type or "").count("/") == 2
 
-    async def press(self, values: Any = None, *, by: str = PROGRAM) -> bool:
+    async def press(self, values: Any = None, *, by: Operator | str = PROGRAM) -> bool:
         """Run the action; return whether it succeeded.
 
         Args:
@@ -94,7 +95,8 @@ class RobotButton:
                 self._become("failed", f"Not done: {why}", by)
             return False
         self._become("running", "", by)
-        log.info("%s: %s pressed %r", self.robot.name, by, self.spec.label)
+        who = by.logged if isinstance(by, Operator) else by
+        log.info("%s: %s pressed %r", self.robot.name, who, self.spec.label)
         try:
             if values is None:
                 values = self._configured()
@@ -147,7 +149,7 @@ class RobotButton:
             return self.spec.values
         return checked(fields, self.spec.values, ros2=self.ros2)
 
-    def _become(self, state: State, words: str, by: str) -> None:
+    def _become(self, state: State, words: str, by: Operator | str) -> None:
         self.state, self.result, self.by = state, words, by
         self.since = time.monotonic()
         self.notify()

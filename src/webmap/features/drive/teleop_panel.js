@@ -1,7 +1,7 @@
 import { Stick } from "../../web/inputs/sticks.js";
 import { isTested, motions, ownStop, stopTestText, timings } from "../../web/motion/measurements.js";
 import { heldByProgram, isLatched, stopKey } from "../../web/motion/report.js";
-import { capOf, speedOf } from "../../web/motion/status.js";
+import { begun, capOf, speedOf } from "../../web/motion/status.js";
 import {
   button,
   html,
@@ -305,7 +305,7 @@ export class Requests {
       "p",
       "webmap-request-words",
       {},
-      html("strong", "", { role: "alert" }, `${who} requests control of ${name}`),
+      html("strong", "", { role: "alert" }, begun(`${who} requests control of ${name}`)),
       " ",
       left,
     );

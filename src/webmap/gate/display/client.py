@@ -153,6 +153,7 @@ class GateClient:
         send: Callable[[str], None],
         close: Callable[[str], None],
         id: str = "",
+        identity: protocol.Identity | None = None,
     ) -> DriveConnection:
         """Register a page's socket with the gate.
 
@@ -162,12 +163,13 @@ class GateClient:
             send: Called with each text for the page, in the client's thread.
             close: Called with the reason to close the socket, in the same thread.
             id: Its id at another gate, which the page knows.
+            identity: That of the user and the page, if the page shows who "you" are.
 
         Raises:
             ConfigError: If there is no such role.
 
         """
-        return self._pages.connect(name, role, send, close, id)
+        return self._pages.connect(name, role, send, close, id, identity)
 
     def show_again(self, connection: DriveConnection) -> None:
         """Send a page the newest report of every robot."""

@@ -3,6 +3,7 @@
 ::
 
     {"op": "hello", "connection": "c5", "ticks": 20}
+    {"op": "you", "name": "Ann (desk 4)", "person": "91c2", "page": "0b7e"}
     {"op": "tick", "tick": 812, "ack": 16}
     {"op": "robot", "robot": "r1", "name": "Bob", "state": "held",
      "holder": {"connection": "c5", "name": "Ann"}, "mine": true, "epoch": 3,
@@ -20,7 +21,9 @@
     {"op": "refused", "robot": "r1", "what": "take", "why": "Ann drives it"}
 
 ``hello`` comes first, also after the gate was restarted (all leases have then ended),
-and after it a ``robot`` for every robot. ``tick`` comes ``ticks`` times a second: 20,
+and after it ``you``, with the name that others see and
+the identity of the person and the page, and a ``robot`` for every robot. ``you`` comes
+again with another name. ``tick`` comes ``ticks`` times a second: 20,
 or 2 to a page of a viewer, which may only stop; ``ack`` is the newest accepted ``seq``
 of this connection, -1 at first. ``gone`` means that the robot was removed. ``robot``
 comes when something changed, velocities at 10 Hz at most. Its fields:
@@ -32,7 +35,9 @@ comes when something changed, velocities at 10 Hz at most. Its fields:
     press. ``confirmed`` is null while standstill is not known yet, and false, with the
     reason, if it could not be checked or the robot still moves.
 ``holder``, ``mine``, ``epoch``
-    The lease; ``holder`` and ``epoch`` are null without one.
+    The lease; ``holder`` and ``epoch`` are null without one. Who has control, requests
+    it or pressed STOP has an ``identity`` too, if it is a person: ``{"person": "91c2",
+    "page": "0b7e"}``, as in ``you``.
 ``asker``, ``changing``
     Who requests control: ``{"connection": "c6", "name": "Ben", "left": 7.5}``, with the
     seconds until it is granted without an answer. ``changing`` means that the lease
@@ -88,15 +93,17 @@ import itertools
 import logging
 import threading
 from collections.abc import Callable
-from typing import get_args
+from typing import Any, get_args
 
 import msgspec
+from msgspec.structs import replace
 
 from webmap.base.errors import ConfigError, MotionError
+from webmap.base.text import isolated
 from webmap.gate import protocol
 from webmap.gate.commands import MoveFor
 from webmap.gate.limits import Cap, Speed, offered, page_cap
-from webmap.gate.protocol import Hello, Refused, RobotGone, RobotReport, Role
+from webmap.gate.protocol import Hello, Identity, Refused, RobotGone, RobotReport, Role
 
 
 def hello_text(hello: Hello, ticks: int) -> str:
@@ -108,6 +115,12 @@ def hello_text(hello: Hello, ticks: int) -> str:
 
     """
     return _text("hello", connection=hello.connection, ticks=ticks)
+
+
+def you_text(name: str, identity: Identity) -> str:
+    """Return the message that tells a page who it is for others."""
+    person, page = identity.person, identity.page
+    return _text("you", name=isolated(name), person=person, page=page)
 
 
 def tick_text(tick: int, ack: int, agent: str = "") -> str:
@@ -133,14 +146,24 @@ def robot_text(
     del fields["type"]
     if agent:
         fields["gate"] = agent
-        for who in (fields["holder"], fields["asker"]):
-            if who is not None and who["connection"].startswith(prefix):
-                own = who["connection"].removeprefix(prefix)
-                who["connection"] = own.partition(".")[0]
+    for key in ("holder", "asker", "stop"):
+        if fields[key] is not None:
+            _localize(fields[key], prefix)
     if report.holder is None:
         speed = offered(Speed(report.v, report.w, report.why), page)
         fields |= {"v": speed.v, "w": speed.w, "why": speed.why}
     return _text("robot", mine=mine, **fields)
+
+
+def _localize(who: dict[str, Any], prefix: str) -> None:
+    """Name a person in a report as this display does, without its own prefix."""
+    name = "by" if "by" in who else "name"
+    who[name] = isolated(who[name])
+    own = who.get("connection", "")
+    if prefix and own.startswith(prefix):
+        who["connection"] = own.removeprefix(prefix).partition(".")[0]
+    if identity := who.get("identity"):
+        identity["person"] = identity["person"].removeprefix(prefix)
 
 
 def gone_text(gone: RobotGone) -> str:
@@ -203,6 +226,18 @@ class DriveConnection:
             self._speeds = speeds
             self.cap = page_cap(v, w)
             self._pages.new_speeds(self, speeds)
+
+    def rename(self, name: str) -> None:
+        """Show the person at the page under another name from now on."""
+        if name != self._hello.name:
+            self._hello = replace(self._hello, name=name)
+            self._pages.send(protocol.Rename(self.id, name))
+            self.introduce()
+
+    def introduce(self) -> None:
+        """Send the page the name of its person, if it has an identity."""
+        if self._hello.identity is not None:
+            self.send_text(you_text(self._hello.name, self._hello.identity))
 
     def move(self, robot: str, x: float, y: float, yaw: float) -> None:
         """Send a goal of the program in the name of this page.
@@ -294,6 +329,7 @@ class Pages:
         send: Callable[[str], None],
         close: Callable[[str], None],
         id: str = "",
+        identity: Identity | None = None,
     ) -> DriveConnection:
         """Register a page's socket; see ``GateClient.connect``."""
         if role not in get_args(Role):
@@ -301,7 +337,9 @@ class Pages:
         with self._lock:
             number = next(self._numbers)
             own = f"{id}.{number}" if id else f"c{number}"
-            hello = protocol.Connect(f"{self._prefix}{own}", name, role)
+            hello = protocol.Connect(
+                f"{self._prefix}{own}", name, role, identity=identity
+            )
             connection = DriveConnection(self, hello, send, close)
             self._connections[connection.id] = connection
             self.send(hello)
@@ -401,6 +439,7 @@ class Pages:
             connection.greeted = True
             if not self._agent:  # a page is greeted by the display's own gate alone
                 connection.send_text(hello_text(hello, connection.ticks))
+                connection.introduce()
             for report in list(self._latest.values()):
                 self._show(connection, report)
 

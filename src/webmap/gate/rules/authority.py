@@ -10,6 +10,7 @@ While control changes, there is no holder, and the gate writes only zeros.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from webmap.base.geometry import Twist
 from webmap.gate.commands import Refusal
@@ -128,9 +129,7 @@ class Handover:
         if self.asker is None:
             self.asker, self._asked_at = who, now
         elif self.asker is not who:
-            raise Refusal(
-                f"{self.asker.name or self.asker.id} has already requested control"
-            )
+            raise Refusal(f"{self.asker.called} has already requested control")
 
     def left(self, now: float) -> float:
         """Return the seconds until the request is granted without an answer."""
@@ -216,8 +215,10 @@ class Authority:
         """Return why control cannot be taken now, as text for people, or ``None``."""
         successor = self.handover.successor
         if successor is not None and not self._conditions.stopped:
-            name = successor.name or successor.id
-            return f"control is being handed over to {name}; the robot stops first"
+            return (
+                f"control is being handed over to {successor.called}; "
+                "the robot stops first"
+            )
         return self._conditions.why_unavailable(now)
 
     def is_held_by(self, connection: str) -> bool:
@@ -234,11 +235,16 @@ class Authority:
     def give(self, to: Connection, now: float) -> int:
         """Give the lease to a connection and return its epoch; nothing moves."""
         epoch = self._epochs.next()
-        self.lease = Lease(to.id, to.name, epoch, to.program)
+        self.lease = Lease(to.id, to.name, epoch, to.program, to.identity)
         self.deadman = DeadMan(needs_neutral=not to.program)
         self.renew(now)
         self._new_driver(to.cap, now)
         return epoch
+
+    def rename(self, who: Connection) -> None:
+        """Take over the new name of a connection, if it has the lease."""
+        if self.lease is not None and self.lease.connection == who.id:
+            self.lease = replace(self.lease, name=who.name)
 
     def _new_driver(self, cap: Cap, now: float) -> None:
         """Reset everything that belonged to the previous holder."""
@@ -311,7 +317,7 @@ class Authority:
 
     def hand_over(self, successor: Connection, now: float) -> None:
         """Write zero; ``successor`` gets control when the machine has stopped (S5)."""
-        self._end(f"control is handed over to {successor.name or successor.id}", now)
+        self._end(f"control is handed over to {successor.called}", now)
         if self._robots.drivable:
             self._motion.zero(now)
         # A robot that follows a goal would not stop.

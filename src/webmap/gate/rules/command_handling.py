@@ -126,12 +126,12 @@ class CommandHandler:
     def cancel(self, connection: Connection, robot: str, now: float) -> None:
         """Cancel a robot's goals; this needs no lease."""
         check_role(connection.role)
-        why = f"by {connection.name or connection.id}"
-        self._machines.find(robot).robots.goals[robot].cancel(now, why)
+        goals = self._machines.find(robot).robots.goals[robot]
+        goals.cancel(now, f"by {connection.called}")
 
     def stop(self, robot: str | None, by: Connection, now: float) -> None:
         """STOP a robot or, with ``None``, all robots: first the zeros of all."""
-        press = new_press(by.name or by.id)
+        press = new_press(by.name or by.id, by.identity)
         stopped = (
             list(self._machines) if robot is None else [self._machines.find(robot)]
         )
@@ -201,7 +201,7 @@ class CommandHandler:
         if isinstance(answer, Grant):
             machine.authority.hand_over(asker, now)
         else:
-            machine.authority.deny(f"{connection.name or connection.id} keeps control")
+            machine.authority.deny(f"{connection.called} keeps control")
             machine.authority.renew(now)
 
     def checked(

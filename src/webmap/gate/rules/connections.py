@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from webmap.base.text import isolated
 from webmap.gate.actions import Emit, SendToDisplay
 from webmap.gate.commands import Refusal
 from webmap.gate.limits import page_cap
@@ -15,6 +16,7 @@ from webmap.gate.protocol import (
     CloseConnection,
     Connect,
     Hello,
+    Identity,
     Refused,
     RefusedCount,
     Role,
@@ -92,6 +94,12 @@ class Lease:
     epoch: int
     program: bool = False
     """Whether a program is the holder; any operator may take control from it."""
+    identity: Identity | None = None
+
+    @property
+    def called(self) -> str:
+        """The holder in a sentence for people."""
+        return isolated(self.name or self.connection)
 
 
 class Epochs:
@@ -127,7 +135,7 @@ def check_take(
     check_role(role)
     if lease is None or (lease.program and not program):
         return
-    raise Refusal(f"{lease.name or lease.connection} has control")
+    raise Refusal(f"{lease.called} has control")
 
 
 def check_lease(lease: Lease | None, connection: str, epoch: int) -> None:
@@ -140,7 +148,7 @@ def check_lease(lease: Lease | None, connection: str, epoch: int) -> None:
     if lease is None:
         raise Refusal("no operator has control: take control first")
     if lease.connection != connection:
-        raise Refusal(f"{lease.name or lease.connection} has control")
+        raise Refusal(f"{lease.called} has control")
     if lease.epoch != epoch:
         raise Refusal(
             f"control of the robot changed: got epoch {epoch}, expected {lease.epoch}"
@@ -200,16 +208,24 @@ class Connection:
         name: Its name for people.
         role: Its role.
         program: Whether it is a program, the Python code of a display.
+        identity: That of the person at the page.
 
     """
 
     def __init__(
-        self, id: str, name: str, role: Role, *, program: bool = False
+        self,
+        id: str,
+        name: str,
+        role: Role,
+        *,
+        program: bool = False,
+        identity: Identity | None = None,
     ) -> None:
         self.id = id
         self.name = name
         self.role = role
         self.program = program
+        self.identity = identity
         self.acked = -1
         """The newest accepted ``seq``."""
         self.cap = page_cap()
@@ -222,6 +238,11 @@ class Connection:
         self._last_refused = ""
         self._counted_at = float("-inf")
         self._sent_at: dict[tuple[str | None, str, str], float] = {}
+
+    @property
+    def called(self) -> str:
+        """The connection in a sentence for people."""
+        return isolated(self.name or self.id)
 
     def set_speeds(self, v: float, w: float) -> None:
         """Set the limits of the page's ``Teleop``; invalid ones mean speed 0."""
@@ -287,7 +308,11 @@ class Connections:
     def add(self, message: Connect) -> None:
         """Add the connection of a page, or of a program of another display."""
         self._all[message.connection] = Connection(
-            message.connection, message.name, message.role, program=message.program
+            message.connection,
+            message.name,
+            message.role,
+            program=message.program,
+            identity=message.identity,
         )
         self._emit(SendToDisplay(Hello(message.connection)))
 

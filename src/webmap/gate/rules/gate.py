@@ -60,6 +60,7 @@ class Gate:
         self._handlers: dict[type, Callable[[Any, float], None]] = {
             **self._machines.handlers,
             protocol.Connect: self._connect,
+            protocol.Rename: self._rename,
             protocol.Disconnect: self._disconnect,
             protocol.FromPage: self._from_page,
             protocol.FromProgram: self._commands.handle_program,
@@ -126,6 +127,14 @@ class Gate:
         if message.connection != PROGRAM:
             self._disconnect(protocol.Disconnect(message.connection), now)
             self._connections.add(message)
+
+    def _rename(self, message: protocol.Rename, now: float) -> None:
+        connection = self._connections.find(message.connection)
+        if connection is None or connection.program:
+            return
+        connection.name = message.name
+        for machine in self._machines.which(lambda m: m.involves(connection.id)):
+            machine.authority.rename(connection)
 
     def _disconnect(self, message: protocol.Disconnect, now: float) -> None:
         if message.connection == PROGRAM or not self._connections.remove(

@@ -20,6 +20,7 @@ import math
 from typing import Literal
 
 from webmap.base.geometry import Twist
+from webmap.base.text import isolated
 from webmap.gate.actions import Emit, SendToDisplay
 from webmap.gate.commands import Refusal
 from webmap.gate.events import GoalWritten, Key, LockState, Press, TwistWritten
@@ -222,7 +223,7 @@ class Machine:
 
     def stop(self, press: Press, now: float) -> None:
         """Activate STOP: write zero at once, end the lease, cancel the goals."""
-        self.authority.end(f"STOP by {press.by}", now)
+        self.authority.end(f"STOP by {isolated(press.by)}", now)
         self.active_stop.press(press, now)
         self._expect_standstill(now)
 
@@ -233,7 +234,7 @@ class Machine:
             self.active_stop.on_file_changed(press, lock.elsewhere)
             and press is not None
         ):
-            self.authority.end(f"STOP by {press.by}", now)
+            self.authority.end(f"STOP by {isolated(press.by)}", now)
             self.active_stop.take_over(press, now)
             self._expect_standstill(now)
 

@@ -37,7 +37,9 @@ def report(machine: Machine, spec: RobotSpec, now: float) -> RobotReport:
     speed = machine.speeds.own if lease is None else machine.speeds.speed
     age, test = machine.speeds.ages.p95, machine.tests.last
     echoed, measured = machine.observation.echoed, machine.observation.shown(now)
-    holder = None if lease is None else Holder(lease.connection, lease.name)
+    holder = None
+    if lease is not None:
+        holder = Holder(lease.connection, lease.name, lease.identity)
     stop_time, reason = machine.speeds.stop_time, _reason(machine, now)
     unavailable = reason if lease is None else machine.authority.why_unavailable(now)
     goals = machine.robots.goals[spec.id]
@@ -145,9 +147,8 @@ def _asker(machine: Machine, now: float) -> AskerReport | None:
     asker = machine.authority.handover.asker
     if asker is None:
         return None
-    return AskerReport(
-        asker.id, asker.name, round(machine.authority.handover.left(now), 1)
-    )
+    left = round(machine.authority.handover.left(now), 1)
+    return AskerReport(asker.id, asker.name, left, asker.identity)
 
 
 def _stop(machine: Machine) -> StopReport | None:
@@ -158,7 +159,7 @@ def _stop(machine: Machine) -> StopReport | None:
     why = seen.why
     if machine.latch.trouble is not None:
         why = f"{why}; a restart would end this STOP: {machine.latch.trouble}"
-    return StopReport(press.by, seen.confirmed, why, press.id)
+    return StopReport(press.by, seen.confirmed, why, press.id, press.identity)
 
 
 def _velocity(twist: Twist) -> Velocity:

@@ -15,9 +15,11 @@ reset names the press that a person saw, so it cannot end a newer one.
 import secrets
 
 from webmap.base.geometry import Twist
+from webmap.base.text import isolated
 from webmap.gate.actions import Emit, SaveStop
 from webmap.gate.commands import Refusal
 from webmap.gate.events import Key, Press, StopSaved
+from webmap.gate.protocol import Identity
 from webmap.gate.rules.aliases import Aliases
 from webmap.gate.rules.health import (
     GAP,
@@ -31,21 +33,21 @@ from webmap.gate.rules.health import (
 from webmap.gate.rules.motion import Motion
 
 
-def new_press(by: str) -> Press:
+def new_press(by: str, identity: Identity | None) -> Press:
     """Return a press of STOP with a new identity.
 
     Args:
         by: The name of the person or program that pressed STOP.
+        identity: That of the person.
 
     """
-    return Press(by, secrets.token_hex(8))
+    return Press(by, secrets.token_hex(8), identity)
 
 
 def newer_stop(press: Press) -> str:
     """Return why a reset does not end this STOP, for the person who reset."""
-    return (
-        f"{press.by} pressed STOP meanwhile; look at the robot, then press Reset again"
-    )
+    by = isolated(press.by)
+    return f"{by} pressed STOP meanwhile; look at the robot, then press Reset again"
 
 
 class StopLatch:
@@ -76,7 +78,7 @@ class StopLatch:
     @property
     def by(self) -> str | None:
         """The name of who pressed STOP last; ``None`` if STOP is not active."""
-        return None if self.press is None else self.press.by
+        return None if self.press is None else isolated(self.press.by)
 
     @property
     def on(self) -> bool:

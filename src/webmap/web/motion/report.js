@@ -11,7 +11,7 @@ import { SEEN } from "../constants.js";
  * @property {string} name
  * @property {'free' | 'held' | 'driving' | 'stopping' | 'stopped'} state
  * @property {string} doing The state as the page shows it: a name of `WORDS`.
- * @property {{connection: string, name: string} | null} holder
+ * @property {{connection: string, name: string, identity?: Identity} | null} holder
  * @property {boolean} mine Whether this page's connection holds the lease.
  * @property {number | null} epoch
  * @property {boolean} armed Whether the gate accepts a command to move now.
@@ -50,6 +50,15 @@ import { SEEN } from "../constants.js";
  */
 
 /**
+ * Whose page it is. Names may be equal, and they may change.
+ *
+ * @typedef {{person: string, page?: string}} Identity
+ *
+ * @typedef {Identity & {name: string}} You This page: its person and the name that others
+ *     see.
+ */
+
+/**
  * @typedef {object} GoalReport
  * @property {string} id
  * @property {number} x Metres.
@@ -73,6 +82,7 @@ import { SEEN } from "../constants.js";
  *     stopped; null until that is decided.
  * @property {string} why Why it is not confirmed.
  * @property {string} [id] Its identity, for a reset. Each press has its own.
+ * @property {Identity} [identity] That of the person.
  */
 
 /**
@@ -81,6 +91,7 @@ import { SEEN } from "../constants.js";
  * @property {string} name
  * @property {number} left Seconds until the robot is handed over unless the holder
  *     keeps it, counted from the report.
+ * @property {Identity} [identity] That of the person.
  */
 
 /** @typedef {{state: 'creeping' | 'waiting' | 'done' | 'failed', text: string}} StopTest */
@@ -99,6 +110,36 @@ export function linearSpeed([x, y, , z = 0]) {
  */
 export function angularSpeed([, , turn = 0, , rx = 0, ry = 0]) {
   return Math.hypot(turn, rx, ry);
+}
+
+/**
+ * Name the person of this page "you" in a report: no other page may be called so.
+ *
+ * @param {RobotReport} report Changed.
+ * @param {You} you
+ */
+export function nameYou(report, you) {
+  if (!you.person) return;
+  for (const who of [report.holder, report.asker]) {
+    if (who?.identity?.person === you.person) who.name = "your other page";
+  }
+  const { stop, goal } = report;
+  if (stop?.identity?.person === you.person) {
+    stop.by = stop.identity.page === you.page ? "you" : "you, on another page";
+  }
+  if (report.reason) report.reason = textForYou(report.reason, you);
+  if (goal) goal.why = textForYou(goal.why, you);
+}
+
+/**
+ * @param {string} text A text of the gate, which is the same for all pages.
+ * @param {You} you
+ */
+export function textForYou(text, { name }) {
+  if (!name) return text;
+  return text
+    .replaceAll(`${name} has control`, "your other page has control")
+    .replaceAll(`by ${name}`, "by you");
 }
 
 /** @param {RobotReport} report */

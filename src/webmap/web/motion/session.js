@@ -9,7 +9,7 @@
 import { Inputs } from "./inputs.js";
 import { MotionDelay } from "./measurements.js";
 import { Pilot } from "./pilot.js";
-import { isOver } from "./report.js";
+import { isOver, nameYou, textForYou } from "./report.js";
 import { RoundTrips } from "./round_trips.js";
 import { StopResults, UnansweredStops } from "./stops.js";
 
@@ -40,6 +40,8 @@ export class Session {
      * @type {string | null}
      */
     this.connection = null;
+    /** @type {import('./report.js').You} */
+    this.you = { name: "", person: "" };
     /** @type {LinkState} */
     this.state = "connecting";
     this._unanswered = new UnansweredStops();
@@ -188,7 +190,11 @@ export class Session {
       case "tick":
         this.loops.receive(message, now);
         return [];
+      case "you":
+        this.you = message;
+        return [];
       case "robot":
+        nameYou(message, this.you);
         for (const one of this._watching) one.report(message, now);
         return [["robot", message]];
       case "gone":
@@ -196,6 +202,7 @@ export class Session {
         return [["gone", message.robot]];
       case "refused":
         if (message.what === "goal") this._sentTo.delete(message.robot);
+        message.why = textForYou(message.why, this.you);
         this.pilot.refuse(message.robot, message.what, message.why, now);
         return [["refused", message]];
       default:

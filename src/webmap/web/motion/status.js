@@ -118,7 +118,7 @@ function wordsOf(name, { report, since = "" }) {
   const text = (report?.mine && words[`${name}_by_you`]) || words[name];
   const holder = report?.holder;
   const who = holder?.name || holder?.connection || "Another operator";
-  return text.replace(/\{(who|since)\}/, (_, key) => (key === "who" ? who : since));
+  return begun(text.replace(/\{(who|since)\}/, (_, key) => (key === "who" ? who : since)));
 }
 
 /**
@@ -197,10 +197,10 @@ function reasonOf({ text }) {
  */
 function ofOther(title, status, report, request) {
   const who = report.holder?.name || report.holder?.connection || "Another operator";
-  const words = title.includes(who) ? [] : [`${who} has control.`];
+  const words = title.includes(who.slice(1)) ? [] : [begun(`${who} has control.`)];
   if (request && request.by === status.connection) {
     words.push(`Control requested: handed over in ${request.left} s unless ${who} refuses.`);
-  } else if (request) words.push(`${request.who} requests control.`);
+  } else if (request) words.push(begun(`${request.who} requests control.`));
   else if (status.refusal) words.push(sentence(status.refusal));
   return description("held", title, words.join(" "));
 }
@@ -303,6 +303,11 @@ export function sentence(text) {
   const [first] = text.split(/[.,:;]*(?:\s|$)/, 1);
   const start = /[\d/_:.]/.test(first) ? text.charAt(0) : text.charAt(0).toUpperCase();
   return `${start}${text.slice(1)}${text.endsWith(".") ? "" : "."}`;
+}
+
+/** @param {string} text Returned with a capital letter at its beginning. */
+export function begun(text) {
+  return `${text.charAt(0).toUpperCase()}${text.slice(1)}`;
 }
 
 /**
