@@ -214,6 +214,34 @@ def test_the_open_palette_lets_no_key_drive_and_stop_closes_it(open_console):
     page.get_by_role("button", name="Press again").click()
 
 
+def test_the_palette_finds_stop_and_a_reset_that_is_pressed_twice(open_console):
+    page = open_console()
+
+    def find(text: str) -> None:
+        page.keyboard.press("Control+k")
+        page.keyboard.type(text)
+        page.keyboard.press("Enter")
+
+    select(page, "Robot 2")
+    find("stop")  # of the selected robot
+    expect(title(page)).to_have_text("STOP active")
+    standing = page.locator(".webmap-stop-standing")
+    expect(standing).to_contain_text("Robot 2")
+    find("stop all")
+    expect(standing).to_contain_text(f"{ROBOTS} robots")
+    find("reset all")
+    page.wait_for_timeout(600)
+    expect(title(page)).to_have_text("STOP active")
+    again = page.get_by_role("button", name="Press again to reset")
+    expect(again).to_be_focused()
+    page.keyboard.press("Enter")
+    expect(standing).to_be_empty()
+    find("follow")
+    expect(page.get_by_role("button", name="Follow")).to_have_attribute(
+        "aria-pressed", "true"
+    )
+
+
 def test_the_needle_shows_the_rotation_and_turns_north_up(open_console):
     page = open_console()
     north = page.get_by_role("button", name="Turn north up")

@@ -1,9 +1,10 @@
 import { byId, html, setHidden, setText } from "../web/tools/elements.js";
 
 /**
- * The command palette: one field that finds robots, tools, layers, places and settings,
- * and does what the line says. Each entry presses the button that the page has for it,
- * so that the palette can do nothing that the page cannot.
+ * The command palette: one field that finds robots, STOP and other commands, tools,
+ * layers, places and settings, and does what the line says. Each entry presses the
+ * button that the page has for it, so that the palette can do nothing that the page
+ * cannot: STOP is sent as by its button, and Reset waits for its second press.
  */
 
 /** @typedef {import('../web/drive.js').Drive} Drive */
@@ -12,10 +13,17 @@ import { byId, html, setHidden, setText } from "../web/tools/elements.js";
 /** The most lines that are shown. */
 const MOST = 12;
 
-/** Buttons of the page, by kind; hidden and disabled ones are left out. */
+const STOP = "STOP";
+
+/**
+ * Buttons of the page, by kind; hidden and disabled ones are left out. STOP is last, so
+ * that Enter without a text does not press it.
+ */
 const BUTTONS = /** @type {const} */ ([
   ["Robot", "#robots > .row > button", ".name"],
   ["Selected robot", "#card :is(.actions, .card-buttons) button", ""],
+  ["Selected robot", "#card [data-act=follow]", ""],
+  ["Selected robots", ".webmap-several > button:not(.webmap-stop-button)", ""],
   ["Camera", "#card [data-camera-id]", ".camera-title"],
   ["Control", ".webmap-teleop-acts button", ""],
   ["Tool", ".tools .webmap-tool-go", ".webmap-tool-name"],
@@ -23,6 +31,10 @@ const BUTTONS = /** @type {const} */ ([
   ["View", ".map-tools button", ""],
   ["Setting", ".webmap-export-menu button", ""],
   ["Setting", "#panel-turn, #help-open", ""],
+  [STOP, ".webmap-teleop-stop", ""],
+  [STOP, ".webmap-several-stop", ""],
+  [STOP, ".webmap-stop-all", ""],
+  ["All robots", ".webmap-stop-row button", ""],
 ]);
 
 /**
@@ -147,7 +159,7 @@ class Palette {
  * @param {Entry[]} all
  * @param {string} text
  * @returns {Entry[]} The entries that have every word of the text in their kind or
- *     name; those whose name begins with the text are first.
+ *     name; those whose name begins with the text are first, and STOP before them.
  */
 export function matching(all, text) {
   const wanted = text.trim().toLowerCase();
@@ -156,8 +168,12 @@ export function matching(all, text) {
     const in_ = `${kind} ${name}`.toLowerCase();
     return words.every((word) => in_.includes(word));
   });
-  const begins = (/** @type {Entry} */ { name }) => name.toLowerCase().startsWith(wanted);
-  return [...found.filter(begins), ...found.filter((entry) => !begins(entry))];
+  if (wanted === "") return found;
+  const rank = (/** @type {Entry} */ { kind, name }) => {
+    if (!name.toLowerCase().startsWith(wanted)) return 2;
+    return kind === STOP ? 0 : 1;
+  };
+  return found.sort((one, other) => rank(one) - rank(other));
 }
 
 /** @returns {Entry[]} Everything that the page has now. */
