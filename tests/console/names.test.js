@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { clustersOf, roomFor } from "../../src/webmap/console/robot_marks.js";
+import { clustersOf, roomFor, worst } from "../../src/webmap/console/robot_marks.js";
 
 const name = (x, y, first = false) => ({ x, y, width: 60, first });
 
@@ -66,4 +66,12 @@ test("1000 robots are clustered in less time than a pass may take", () => {
   const begin = performance.now();
   clustersOf(many);
   assert.ok(performance.now() - begin < 300);
+});
+
+test("only the worst eight of those that need someone have words", () => {
+  const robots = Array.from({ length: 500 }, (_, i) => ({ rank: 500 - i, words: "Lost" }));
+  robots[499].words = ""; // the worst one needs no one
+  const found = worst(robots, [...robots.keys()]);
+  assert.deepEqual([...found], [498, 497, 496, 495, 494, 493, 492, 491]);
+  assert.equal(worst(robots, [499]).size, 0);
 });

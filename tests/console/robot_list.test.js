@@ -7,6 +7,7 @@ import {
   countsOf,
   isShown,
   MANY,
+  nextNeed,
 } from "../../src/webmap/console/robot_list.js";
 
 const GROUPS = ["lost", "stopped", "free"];
@@ -77,4 +78,28 @@ test("nothing that compares names in a language is made while modules load", asy
   const made = t.mock.method(Intl, "Collator");
   await import("../../src/webmap/console/robot_list.js?again");
   assert.equal(made.mock.callCount(), 0);
+});
+
+test("N goes round the robots that need someone, in both directions", () => {
+  const robots = ["each", "", "each", ""].map((need) => ({ group: "stopped", need }));
+  assert.equal(nextNeed(robots, -1, 1), 0);
+  assert.equal(nextNeed(robots, 0, 1), 2);
+  assert.equal(nextNeed(robots, 1, 1), 2);
+  assert.equal(nextNeed(robots, 2, 1), 0);
+  assert.equal(nextNeed(robots, 0, -1), 2);
+  assert.equal(nextNeed(robots, 3, -1), 2);
+});
+
+test("N finds no other robot where none or only the selected one needs someone", () => {
+  assert.equal(nextNeed([], -1, 1), -1);
+  assert.equal(nextNeed([{ group: "free", need: "" }], 0, 1), -1);
+  assert.equal(nextNeed([{ group: "lost", need: "each" }], 0, 1), -1);
+});
+
+test("thirty robots with the fault of one bridge are one robot for N", () => {
+  const fault = { group: "without a connection to hall", need: "one" };
+  const robots = [...Array(30).fill(fault), { group: "stopped", need: "each" }];
+  assert.equal(nextNeed(robots, -1, 1), 0);
+  assert.equal(nextNeed(robots, 0, 1), 30);
+  assert.equal(nextNeed(robots, 30, 1), 0);
 });

@@ -3,7 +3,7 @@
 The environment has ``ROBOTS``, the number of robots, and may have ``BRIDGE``, the
 address of a simulator with these robots, of which the last one is removed every two
 seconds; a new pose brings a removed robot back. Robots without a bridge get their
-poses here.
+poses here, and the state ``STATE``, if that is given.
 """
 
 import asyncio
@@ -14,12 +14,17 @@ import time
 import webmap
 from webmap.base.geometry import Quaternion, Vector3
 from webmap.console import open_console
+from webmap.core.robot_state import STATE_TEXTS, RobotState
 from webmap.poses.placing import PoseReading
 
 ROBOTS = int(os.environ["ROBOTS"])
 BRIDGE = os.environ.get("BRIDGE")
 ROW = max(1, math.isqrt(ROBOTS))
 """How many robots are beside each other."""
+
+if given := os.environ.get("STATE"):
+    state = RobotState(given, STATE_TEXTS[given], STATE_TEXTS[given])
+    webmap.Robot.state = property(lambda robot: state)
 
 
 def config(number: int) -> webmap.RobotConfig:

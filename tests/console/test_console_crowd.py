@@ -30,7 +30,7 @@ def page(site: str, chromium: Browser) -> Iterator[Page]:
         page.goto(site)
         wait_until_ready(page)
         expect(page.locator(".robot:not(.unplaced)")).to_have_count(30)
-        expect(page.locator("#robot-tools")).to_be_visible()
+        expect(page.locator(".arrange > summary")).to_be_visible()
         yield page
 
 
@@ -79,10 +79,9 @@ def test_a_long_list_has_the_worst_robots_first(page):
 
 
 def test_the_counts_by_state_filter_the_list(page):
-    chips = page.locator(".chip")
-    expect(chips).to_have_text(
-        ["1 lost", "2 stopped", "1 battery low", "1 driven", "1 navigating", "24 free"]
-    )
+    chips = page.locator("#attention > .chip")
+    expect(chips).to_have_text(["1 lost", "2 stopped", "1 battery low", "Next"])
+    expect(page.locator("#robots-count")).to_have_text("30 robots, 4 need someone")
     chips.nth(1).click()
     expect(chips.nth(1)).to_have_attribute("aria-pressed", "true")
     assert names(page) == ["Robot 1", "Robot 2"]
@@ -96,6 +95,36 @@ def test_the_counts_by_state_filter_the_list(page):
     )
 
 
+def filter_by(page: Page, group: str) -> None:
+    if page.locator(".arrange:not([open])").count():
+        page.locator(".arrange > summary").click()
+    page.locator("#other-states > .chip", has_text=group).click()
+
+
+def test_the_other_states_filter_too_and_are_above_the_list_while_they_do(page):
+    filter_by(page, "driven")
+    assert names(page) == ["Robot 5"]
+    page.keyboard.press("Escape")
+    expect(page.locator(".choices")).to_be_hidden()
+    page.locator("#attention > .chip", has_text="1 driven").click()
+    expect(page.locator(ROWS)).to_have_count(30)
+    expect(page.locator("#attention > .chip", has_text="driven")).to_have_count(0)
+
+
+def test_n_goes_to_the_next_robot_that_needs_someone(page):
+    found = []
+    for key in ["n", "n", "n", "n", "n", "Shift+N"]:
+        before = page.locator("#card h2").text_content()
+        page.keyboard.press(key)
+        expect(page.locator("#card h2")).not_to_have_text(before or "")
+        found.append(page.locator("#card h2").text_content())
+    assert found == ["Robot 3", "Robot 1", "Robot 2", "Robot 4", "Robot 3", "Robot 4"]
+    page.locator("#search").fill("")
+    page.locator("#search").press("n")
+    expect(page.locator("#search")).to_have_value("n")
+    expect(page.locator("#card h2")).to_have_text("Robot 4")
+
+
 def test_robots_are_ordered_by_name_in_natural_order(page):
     choose(page, "#robot-order", "name")
     found = [name for name in names(page) if name.startswith("Robot")]
@@ -106,7 +135,7 @@ def test_robots_are_grouped_by_their_first_tag(page):
     choose(page, "#robot-group", "tag")
     titles = page.locator("#robots > .group-name")
     expect(titles).to_have_text(["bay 0 (8)", "bay 1 (8)", "bay 2 (8)", "No tag (6)"])
-    page.locator(".chip", has_text="driven").click()  # Robot 5
+    filter_by(page, "driven")  # Robot 5
     expect(titles.and_(page.locator(":visible"))).to_have_text(["bay 1 (8)"])
 
 

@@ -62,7 +62,8 @@ def test_five_hundred_robots_are_listed_found_and_counted(chromium):
         page.goto(url)
         wait_until_ready(page)
         expect(rows(page)).to_have_count(500, timeout=60_000)
-        expect(page.locator(".chip")).to_have_text(["500 view only"], timeout=60_000)
+        states = page.locator("#other-states > .chip")
+        expect(states).to_have_text(["500 view only"], timeout=60_000)
         assert_free(page.locator(STOP_ALL))
         page.keyboard.press("Control+k")
         page.keyboard.type("robot 499")
@@ -73,6 +74,44 @@ def test_five_hundred_robots_are_listed_found_and_counted(chromium):
         page.locator("#search").fill("robot 49")
         expect(rows(page)).to_have_count(11)
         assert_free(page.locator(STOP_ALL))
+
+
+CHANGES = """() => new Promise((done) => {
+  let count = 0;
+  const observer = new MutationObserver((records) => { count += records.length; });
+  const options = { subtree: true, childList: true, attributes: true };
+  observer.observe(document.querySelector("#attention"), options);
+  for (const robot of document.querySelectorAll(".robot")) {
+    observer.observe(robot, { attributeFilter: ["class"] });
+  }
+  setTimeout(() => done(count), 2000);
+})"""
+"""The changes of the strip and of the classes of robots in two seconds."""
+
+
+def test_five_hundred_robots_in_trouble_are_counted_and_the_page_rests(chromium):
+    with (
+        page_of(SITE, ROBOTS="500", STATE="stopped") as url,
+        watched_tab(chromium, 1280, 800) as page,
+    ):
+        page.allowed = ["closed before the connection is established"]
+        page.goto(url)
+        wait_until_ready(page)
+        expect(rows(page)).to_have_count(500, timeout=60_000)
+        chips = page.locator("#attention > .chip")
+        expect(chips).to_have_text(["500 stopped", "Next"], timeout=60_000)
+        worded = page.locator(".robot:not(.wordless)")
+        expect(worded).to_have_count(0, timeout=60_000)  # all are in circles
+        page.wait_for_function(
+            "() => [...document.querySelectorAll('.cluster title')].some("
+            "(title) => title.textContent.includes('need someone'))"
+        )
+        for _ in range(6):
+            page.locator("#zoom-in").click()
+        expect(worded).to_have_count(8, timeout=60_000)
+        assert page.evaluate(CHANGES) == 0
+        page.keyboard.press("n")
+        expect(page.locator("#card h2")).to_have_text("Robot 0", timeout=60_000)
 
 
 def test_a_page_without_robots_shows_the_next_step_and_stays_as_large(chromium):

@@ -85,12 +85,15 @@ function showConnection(drive) {
   };
 }
 
-/** Show the number of robots, and of robots with stale data. */
+/** Show the number of robots, of those that need someone, and of stale data. */
 function count() {
-  const rows = document.querySelectorAll("#robots > .row").length;
-  const old = document.querySelectorAll("#robots > .row .age.stale").length;
+  const number = (/** @type {string} */ path) =>
+    document.querySelectorAll(`#robots > .row${path}`).length;
+  const [rows, needed, old] = [number(""), number("[data-need]"), number(" .age.stale")];
   const robots = rows === 1 ? "1 robot" : `${rows} robots`;
-  setText(byId("robots-count"), old > 0 ? `${robots}, ${old} with stale data` : robots);
+  const needs = needed > 0 ? `, ${needed} ${needed === 1 ? "needs" : "need"} someone` : "";
+  const stale = old > 0 ? `, ${old} with stale data` : "";
+  setText(byId("robots-count"), `${robots}${needs}${stale}`);
 }
 
 /**

@@ -1,5 +1,6 @@
 /**
- * The list of robots: search, order, groups, counts by state that filter, and keys.
+ * The list of robots: search, order, groups, counts by state that filter, the next robot
+ * that needs someone, and keys.
  * The choice is a part of the layout, and stored in the browser.
  */
 
@@ -17,7 +18,7 @@ import {
 } from "../web/tools/elements.js";
 
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
-/** @typedef {Listed & {row: HTMLElement}} Row */
+/** @typedef {Listed & {row: HTMLElement, need: string}} Row */
 
 /** The key of the choice in this browser's storage. */
 const KEPT = "webmap.list";
@@ -32,7 +33,7 @@ const ORDER_EVERY = 8;
  * @returns {() => void} Leaves the map and its layout.
  */
 export function listenToRobots(map, signal) {
-  const list = new RobotList(signal);
+  const list = new RobotList(map, signal);
   const choosing = () => byId("robots").classList.toggle("choosing", map.selected !== null);
   const offs = [
     map.onSelect(choosing),
@@ -49,9 +50,17 @@ export function listenToRobots(map, signal) {
 }
 
 class RobotList {
-  /** @param {AbortSignal} signal */
-  constructor(signal) {
+  /**
+   * @param {MapCanvas} map
+   * @param {AbortSignal} signal
+   */
+  constructor(map, signal) {
+    this._map = map;
     this._list = byId("robots");
+    this._attention = byId("attention");
+    this._next = byId("next-need");
+    /** @type {string | null} The robot whose selection was sent and is not shown yet. */
+    this._asked = null;
     this._search = /** @type {HTMLInputElement} */ (byId("search"));
     this._order = /** @type {HTMLSelectElement} */ (byId("robot-order"));
     this._group = /** @type {HTMLSelectElement} */ (byId("robot-group"));
@@ -67,6 +76,7 @@ class RobotList {
     this._listen(signal);
     this._listenToSearch(signal);
     this._listenToKeys(signal);
+    this._listenToNeeds(signal);
     this._update();
     this._arrange();
   }
@@ -102,9 +112,13 @@ class RobotList {
       arrange();
     });
     newcomers.observe(this._list, { childList: true });
+    // The card makes the list lower.
+    const resized = new ResizeObserver(() => this._reveal());
+    resized.observe(this._list);
     const offs = [onBeat(() => this._update(), COUNT_EVERY), onBeat(arrange, ORDER_EVERY)];
     signal.addEventListener("abort", () => {
       newcomers.disconnect();
+      resized.disconnect();
       for (const off of offs) off();
     });
   }
@@ -115,7 +129,7 @@ class RobotList {
       if (!(row instanceof HTMLElement)) return [];
       const added = this._added.get(row) ?? this._count++;
       this._added.set(row, added);
-      const { group = "", rank, tag = "", bridge = "", charge } = row.dataset;
+      const { group = "", rank, tag = "", bridge = "", charge, need = "" } = row.dataset;
       const name = row.querySelector(".name")?.textContent ?? "";
       return [
         {
@@ -123,6 +137,7 @@ class RobotList {
           name,
           group,
           rank: Number(rank ?? Infinity),
+          need,
           tag,
           bridge,
           charge: charge === undefined ? null : Number(charge),
@@ -141,7 +156,7 @@ class RobotList {
     this._order.value = orderFor(this.choice.order, rows.length);
     this._group.value = this.choice.group;
     const states = long ? this.choice.states : [];
-    this._showChips(rows);
+    this._showChips(rows, long);
     const wanted = this._search.value.trim();
     for (const robot of rows) {
       robot.row.classList.toggle("filtered", !isShown(robot, wanted, states));
@@ -158,8 +173,13 @@ class RobotList {
     setText(byId("not-found"), none ? noneText(wanted, states) : "");
   }
 
-  /** @param {Row[]} rows */
-  _showChips(rows) {
+  /**
+   * Show the groups that need someone, and those that are chosen, above the list.
+   *
+   * @param {Row[]} rows
+   * @param {boolean} long
+   */
+  _showChips(rows, long) {
     const { states } = this.choice;
     const counts = countsOf(rows, states);
     for (const [group, chip] of this._chips) {
@@ -167,20 +187,28 @@ class RobotList {
       chip.remove();
       this._chips.delete(group);
     }
-    const place = byId("robot-chips");
-    counts.forEach(({ group, count }, index) => {
+    const firsts = new Map([...rows].reverse().map((row) => [row.group, row]));
+    /** @type {HTMLElement[]} */
+    const urgent = [];
+    /** @type {HTMLElement[]} */
+    const others = [];
+    for (const { group, count } of counts) {
       const chip = this._chips.get(group) ?? this._chip(group);
       this._chips.set(group, chip);
-      const row = rows.find((each) => each.group === group)?.row;
-      const shape = row?.querySelector(".shape.now use")?.getAttribute("href");
+      const first = firsts.get(group);
+      const shape = first?.row.querySelector(".shape.now use")?.getAttribute("href");
       const use = chip.querySelector("use");
       if (shape && use) setAttribute(use, "href", shape);
-      if (row) setAttribute(chip, "data-tone", row.dataset.tone ?? "");
+      if (first) setAttribute(chip, "data-tone", first.row.dataset.tone ?? "");
       setText(/** @type {Element} */ (chip.lastElementChild), `${count} ${group}`);
       setAttribute(chip, "aria-pressed", `${states.includes(group)}`);
-      // A chip that is moved loses the focus.
-      if (place.children[index] !== chip) place.insertBefore(chip, place.children[index] ?? null);
-    });
+      (first?.need || states.includes(group) ? urgent : others).push(chip);
+    }
+    setHidden(this._attention, !long || urgent.length === 0);
+    const needed = [...firsts.values()].some(({ need }) => need);
+    setHidden(this._next, !needed);
+    keepOrder(this._attention, [...urgent, this._next]);
+    keepOrder(byId("other-states"), others);
   }
 
   /** @param {string} group */
@@ -193,6 +221,47 @@ class RobotList {
       this.choose({ states: others.length < states.length ? others : [...states, group] });
     });
     return chip;
+  }
+
+  /**
+   * `N` selects the next robot that needs someone, `Shift` and `N` the one before.
+   *
+   * @param {AbortSignal} signal
+   */
+  _listenToNeeds(signal) {
+    this._next.addEventListener("click", () => this._select(1), { signal });
+    const key = (/** @type {KeyboardEvent} */ event) => {
+      if (event.key.toLowerCase() !== "n" || event.repeat || typing(event)) return;
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      event.preventDefault();
+      this._select(event.shiftKey ? -1 : 1);
+    };
+    document.addEventListener("keydown", key, { signal });
+    const off = this._map.onSelect(() => {
+      this._asked = null;
+    });
+    signal.addEventListener("abort", off);
+  }
+
+  /** @param {1 | -1} by */
+  _select(by) {
+    const rows = this._rows();
+    const shown = rows.filter(({ row }) => !row.classList.contains("filtered"));
+    const ring = shown.some(({ need }) => need) ? shown : rows;
+    const from = this._asked ?? this._map.selected;
+    const at = ring.findIndex(({ row }) => row.dataset.robot === from);
+    const next = ring[nextNeed(ring, at, by)]?.row;
+    if (!next) return;
+    this._asked = next.dataset.robot ?? null;
+    next.querySelector("button")?.click();
+  }
+
+  /** Scroll the list to the selected robot, so that the card does not cover its line. */
+  _reveal() {
+    const robot = CSS.escape(this._map.selected ?? "");
+    this._list.querySelector(`:scope > [data-robot="${robot}"]`)?.scrollIntoView({
+      block: "nearest",
+    });
   }
 
   /** Put the rows in order, below the names of their groups. */
@@ -274,6 +343,38 @@ class RobotList {
     };
     this._list.addEventListener("keydown", key, { signal });
   }
+}
+
+/**
+ * Return the robot that the key `N` selects. Of a group with one fault, such as that of
+ * a bridge, only the first robot counts.
+ *
+ * @param {{group: string, need: string}[]} robots
+ * @param {number} at The place of the selected robot; -1 for none.
+ * @param {1 | -1} by The direction.
+ * @returns {number} Its place; -1 if no other robot needs someone.
+ */
+export function nextNeed(robots, at, by) {
+  const seen = new Set();
+  const places = robots.flatMap(({ group, need }, place) => {
+    if (!need || (need === "one" && seen.has(group))) return [];
+    seen.add(group);
+    return place === at ? [] : [place];
+  });
+  const ahead = by > 0 ? places : [...places].reverse();
+  return ahead.find((place) => at < 0 || (place - at) * by > 0) ?? ahead[0] ?? -1;
+}
+
+/**
+ * @param {HTMLElement} parent
+ * @param {HTMLElement[]} children In order; one that stays is not moved, to keep the
+ *     focus.
+ */
+function keepOrder(parent, children) {
+  children.forEach((child, index) => {
+    const there = parent.children[index];
+    if (there !== child) parent.insertBefore(child, there ?? null);
+  });
 }
 
 /**

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from webmap import html, svg
 from webmap.config.robot import BATTERY_LOW
-from webmap.console.robot_looks import GROUPS, LOOKS, battery_tone
+from webmap.console.robot_looks import GROUPS, LOOKS, battery_tone, needs_person
 
 if TYPE_CHECKING:
     from webmap import Element, Map, Robot
@@ -164,6 +164,8 @@ class Row:
             return  # as nearly always, of each robot four times a second
         self._shown = shown
         look = LOOKS[now.name]
+        # One fault of a bridge is one group, whatever else is lost.
+        apart = address if now.name == "no_bridge" else ""
         self._shape.show(look.symbol)
         text = now.text_for(self._person)
         self._state.text, self._mine.text = text, now.mine
@@ -172,7 +174,8 @@ class Row:
         for name, value in {
             "tone": look.tone,
             "state": now.name,
-            "group": look.group,
+            "group": f"without a connection to {apart}" if apart else look.group,
+            "need": "one" if apart else "each" if needs_person(robot) else "",
             "rank": str(GROUPS.index(look.group)),
             "tag": tag,
             "bridge": address,

@@ -93,6 +93,11 @@ def look_of(robot: "Robot") -> Look:
     return LOOKS[robot.state.name]
 
 
+def needs_person(robot: "Robot") -> bool:
+    """Return whether the robot's state ends only when a person does something."""
+    return look_of(robot).group in NEED_A_PERSON
+
+
 def battery_tone(charge: float, low: float) -> str:
     """Return the tone of a charge that is low below ``low``; both from 0 to 1."""
     if charge >= low:
@@ -283,7 +288,7 @@ class StateMark:
         """Show the symbol of the state; its words only if it needs a person."""
         robot, look = self.robot, look_of(self.robot)
         self._use.set(href=f"#{look.symbol}")
-        self._words.text = robot.state.text if look.group in NEED_A_PERSON else ""
+        self._words.text = robot.state.text if needs_person(robot) else ""
         robot.svg.set("data-tone", look.tone or None)
         robot.svg.set("data-group", look.group)
         title = robot.svg.children[0]

@@ -9,8 +9,6 @@ import { scaleOf } from "../web/view.js";
  * in a small picture.
  */
 
-
-
 /**
  * Size of texts on the screen, in pixels: about the width of a letter, the height of a
  * line, and the distance from the robot down to the middle of the name.
@@ -19,8 +17,11 @@ const LETTER = 8;
 const LINE = 18;
 const BELOW = 26;
 
-/** With more visible robots than this, only the selected robot has its name. */
+/** With more visible robots than this, only the selected and the worst have names. */
 const MOST = 150;
+
+/** So many of the worst robots have the words of their state; others are counted. */
+const WORST = 8;
 
 /** Distance in pixels below which two robots overlap. */
 const NEAR = 26;
@@ -154,6 +155,7 @@ function isNear(one, other, reach) {
  * @property {number} x Metres.
  * @property {number} y
  * @property {number} rank The place of its state among all; 0 is the worst.
+ * @property {string} words The words of its state; empty if it needs no one.
  */
 
 /** @type {readonly string[]} The states, the worst first. */
@@ -207,26 +209,46 @@ function wallOf() {
  * @param {Set<number>} joined Robots without a name of their own.
  */
 function showNames({ selected }, robots, places, joined) {
+  const alone = robots.map((_, index) => index).filter((index) => !joined.has(index));
+  const worded = worst(robots, alone);
   const few = robots.length <= MOST;
-  const asked = robots.map((_, index) => index).filter((index) => {
-    return !joined.has(index) && (few || robots[index].id === selected);
+  const asked = alone.filter((index) => {
+    return few || worded.has(index) || robots[index].id === selected;
   });
-  const names = asked.map((index) => nameOf(robots[index], places[index], selected));
+  const names = asked.map((index) => {
+    return nameOf(robots[index], places[index], selected, worded.has(index));
+  });
   const shown = new Set();
   roomFor(names).forEach((room, at) => {
     if (room) shown.add(asked[at]);
   });
-  robots.forEach(({ element }, index) => turn(element, "nameless", !shown.has(index)));
+  robots.forEach(({ element, id }, index) => {
+    turn(element, "nameless", !shown.has(index));
+    turn(element, "wordless", !worded.has(index) && id !== selected);
+  });
+}
+
+/**
+ * @param {Drawn[]} robots
+ * @param {number[]} indices
+ * @returns {Set<number>} The worst of those that need someone, which have words.
+ */
+export function worst(robots, indices) {
+  const needed = indices.filter((index) => robots[index].words !== "");
+  needed.sort((one, other) => robots[one].rank - robots[other].rank || one - other);
+  return new Set(needed.slice(0, WORST));
 }
 
 /**
  * @param {Drawn} robot
  * @param {{x: number, y: number}} place
  * @param {string | null} selected
+ * @param {boolean} worded Whether it has its words.
  * @returns {Name}
  */
-function nameOf({ element, id, rank }, { x, y }, selected) {
-  const texts = [".label", ".words"].map((path) => element.querySelector(path)?.textContent ?? "");
+function nameOf({ element, id, rank, words }, { x, y }, selected, worded) {
+  const label = element.querySelector(".label")?.textContent ?? "";
+  const texts = [label, worded || id === selected ? words : ""];
   const lines = texts[1] ? 2 : 1;
   return {
     x,
@@ -247,7 +269,8 @@ function drawn({ crowd }, element) {
   const { x, y } = crowd.placeOf(element) ?? { x: 0, y: 0 };
   const id = element.getAttribute("data-robot") ?? "";
   const place = STATES.indexOf(element.getAttribute("data-state") ?? "");
-  return { element, id, x, y, rank: place < 0 ? STATES.length : place };
+  const words = element.querySelector(".words")?.textContent ?? "";
+  return { element, id, x, y, rank: place < 0 ? STATES.length : place, words };
 }
 
 /**
@@ -335,12 +358,14 @@ class ClusterMarks {
  * @param {Drawn[]} robots
  */
 function fill(mark, robots) {
-  const worst = robots.reduce((one, other) => (other.rank < one.rank ? other : one)).element;
-  const words = worst.getAttribute("data-group") ?? "";
-  const symbol = worst.querySelector(".state-mark > use")?.getAttribute("href");
-  const label = `${robots.length} robots, the worst: ${words}. Press to zoom in`;
+  const first = robots.reduce((one, other) => (other.rank < one.rank ? other : one)).element;
+  const words = first.getAttribute("data-group") ?? "";
+  const needed = robots.filter((each) => each.words !== "").length;
+  const needs = needed === 0 ? "" : `, ${needed} ${needed === 1 ? "needs" : "need"} someone`;
+  const symbol = first.querySelector(".state-mark > use")?.getAttribute("href");
+  const label = `${robots.length} robots${needs}, the worst: ${words}. Press to zoom in`;
   if (symbol) mark.querySelector("use")?.setAttribute("href", symbol);
-  mark.dataset.tone = worst.getAttribute("data-tone") ?? "";
+  mark.dataset.tone = first.getAttribute("data-tone") ?? "";
   if (mark.getAttribute("aria-label") === label) return;
   mark.setAttribute("aria-label", label);
   for (const [path, text] of [["title", label], [".count", `${robots.length}`]]) {

@@ -10,7 +10,7 @@ from webmap.features.alerts.alerts import KINDS, LOST, Alerts, AlertWatch, condi
 
 def bridge(**changes):
     return SimpleNamespace(
-        **{"state": "open", "lost": False, "replays": False} | changes
+        **{"state": "open", "lost": False, "replays": False, "name": "hall"} | changes
     )
 
 
@@ -133,6 +133,26 @@ def test_a_new_connection_for_commands_makes_no_alert():
     gate_report.link = "up"
     watch.look(5.0)
     assert [alert.ended for alert in alerts.listed.values()] == [5.0]
+
+
+def test_the_fault_of_a_bridge_is_one_alert_and_not_one_for_each_robot():
+    alerts, link = Alerts(), bridge(state="closed", lost=True)
+    robots = [robot(link=link, gate_report=report(link="down")) for _ in range(30)]
+    for number, each in enumerate(robots):
+        each.id = f"r{number}"
+    robots[7].report = report(link="down", alarm="may still be moving")
+    watch = AlertWatch(alerts, lambda: robots)
+    watch.look(1.0)
+    watch.look(1.0 + LOST)
+    fault, worse = alerts.listed.values()
+    assert (fault.kind, fault.name) == ("bridge", "hall")
+    assert fault.text == "No connection: 30 robots"
+    assert (worse.kind, worse.robot) == ("disobeys", "r7")
+    link.lost, link.state = False, "open"
+    for each in robots:
+        each.report = report()
+    watch.look(9.0)
+    assert {a.ended for a in alerts.listed.values()} == {9.0}
 
 
 def test_the_alerts_of_a_removed_robot_end():

@@ -25,6 +25,7 @@ log = logging.getLogger("webmap.modules.alerts")
 KINDS = {
     "disobeys": "not obeying",
     "unconfirmed": "STOP not confirmed",
+    "bridge": "no connection to a bridge",
     "lost": "lost",
     "commands": "no connection for commands",
     "blocked": "blocked",
@@ -247,6 +248,19 @@ def _reported(robot: "Robot") -> dict[str, str]:
     return found
 
 
+def without_bridge(robots: "Iterable[Robot]") -> "list[list[Robot]]":
+    """Return the robots of each lost bridge that has several.
+
+    The fault is one of the bridge: it is one alert and not one for each robot.
+    """
+    lost: dict[int, list[Robot]] = {}
+    for robot in robots:
+        bridge = robot.pose_source.bridge
+        if bridge is not None and bridge.lost and not bridge.replays:
+            lost.setdefault(id(bridge), []).append(robot)
+    return [each for each in lost.values() if len(each) > 1]
+
+
 class AlertWatch:
     """Looks at all robots twice a second, and every five seconds without a page.
 
@@ -283,8 +297,21 @@ class AlertWatch:
     def look(self, now: float) -> None:
         """Report the conditions of all robots, at ``now`` in Unix seconds."""
         found = set()
-        for robot in list(self._robots()):
+        robots = list(self._robots())
+        covered = set()
+        for several in without_bridge(robots):
+            first, bridge = several[0], several[0].pose_source.bridge
+            assert bridge is not None
+            found.add((first.id, "bridge"))
+            text = f"No connection: {len(several)} robots"
+            name = bridge.name or bridge.url
+            self.alerts.report(first.id, name, "bridge", text, now)
+            covered |= {robot.id for robot in several}
+        for robot in robots:
             texts = conditions(robot)
+            if robot.id in covered:
+                texts.pop("lost", None)
+                texts.pop("commands", None)
             if not self._is_unlinked(robot.id, "commands" in texts, now):
                 texts.pop("commands", None)
             for kind in KINDS if texts else ():  # the most urgent first
