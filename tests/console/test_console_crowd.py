@@ -125,6 +125,37 @@ def test_n_goes_to_the_next_robot_that_needs_someone(page):
     expect(page.locator("#card h2")).to_have_text("Robot 4")
 
 
+VISIBLE = """() => {
+  const list = document.querySelector("#robots").getBoundingClientRect();
+  return [...document.querySelectorAll("#robots > .row")].filter((row) => {
+    const { top, bottom, height } = row.getBoundingClientRect();
+    return height > 0 && top >= list.top - 1 && bottom <= list.bottom + 1;
+  }).length;
+}"""
+"""The number of lines that are visible as a whole."""
+
+
+def test_sixteen_robots_are_visible_nine_beside_a_card_and_more_in_a_compact_list(page):
+    page.set_viewport_size({"width": 1440, "height": 900})
+    assert page.evaluate(VISIBLE) >= 16
+    last = page.locator(ROWS).nth(14)
+    name = last.text_content()
+    last.click()
+    expect(page.locator("#card h2")).to_have_text(name)
+    assert page.evaluate(VISIBLE) >= 9
+    # The card that opened does not cover the line of its robot.
+    expect(last).to_be_in_viewport(ratio=0.9)
+    page.locator("#card").get_by_role("button", name="Deselect the robot").click()
+    expect(page.locator("#card")).to_be_hidden()
+    choose(page, "#robot-rows", "compact")
+    page.keyboard.press("Escape")
+    assert page.evaluate(VISIBLE) >= 22
+    page.reload()
+    wait_until_ready(page)
+    expect(page.locator("#robot-rows")).to_have_value("compact")
+    assert page.evaluate(VISIBLE) >= 22
+
+
 def test_robots_are_ordered_by_name_in_natural_order(page):
     choose(page, "#robot-order", "name")
     found = [name for name in names(page) if name.startswith("Robot")]

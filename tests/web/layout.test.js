@@ -28,7 +28,7 @@ const LAYOUT = {
   log: { open: false, least: "warn" },
   panel: { open: true, width: 320, more: false },
   camera: { dock: "float", x: 0.25, y: 1 },
-  list: { order: "state", group: "tag", states: ["stopped"] },
+  list: { order: "state", group: "tag", rows: "compact", states: ["stopped"] },
 };
 
 /** @param {(layout: any) => void} change */

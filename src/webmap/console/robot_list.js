@@ -64,6 +64,7 @@ class RobotList {
     this._search = /** @type {HTMLInputElement} */ (byId("search"));
     this._order = /** @type {HTMLSelectElement} */ (byId("robot-order"));
     this._group = /** @type {HTMLSelectElement} */ (byId("robot-group"));
+    this._size = /** @type {HTMLSelectElement} */ (byId("robot-rows"));
     /** @type {Choice} */
     this.choice = kept();
     /** @type {WeakMap<HTMLElement, number>} When each row was seen first. */
@@ -99,8 +100,10 @@ class RobotList {
     const chosen = () => {
       const { value: order } = this._order;
       const { value: group } = this._group;
-      this.choose(/** @type {Partial<Choice>} */ ({ order, group }));
+      const { value: rows } = this._size;
+      this.choose(/** @type {Partial<Choice>} */ ({ order, group, rows }));
     };
+    this._size.addEventListener("change", chosen, { signal });
     this._order.addEventListener("change", chosen, { signal });
     this._group.addEventListener("change", chosen, { signal });
     const arrange = () => {
@@ -153,6 +156,8 @@ class RobotList {
     const long = rows.length > MANY || rows.some(({ tag }) => tag);
     setHidden(byId("robot-tools"), !long);
     byId("robots-part").classList.toggle("long", long);
+    byId("robots-part").classList.toggle("compact", long && this.choice.rows === "compact");
+    this._size.value = this.choice.rows;
     this._order.value = orderFor(this.choice.order, rows.length);
     this._group.value = this.choice.group;
     const states = long ? this.choice.states : [];
@@ -425,7 +430,7 @@ function keep(choice) {
 export const MANY = 8;
 
 /** @type {Choice} */
-export const AT_FIRST = { order: "auto", group: "none", states: [] };
+export const AT_FIRST = { order: "auto", group: "none", rows: "usual", states: [] };
 
 /** @type {Record<Order, (one: Listed, other: Listed) => number>} */
 const COMPARE = {

@@ -32,6 +32,7 @@ import {
  * @property {'auto' | 'state' | 'name' | 'battery' | 'added'} order `auto`: the worst
  *     first in a long list, else as added.
  * @property {'none' | 'bridge' | 'tag'} group
+ * @property {'usual' | 'compact'} rows
  * @property {string[]} states Only robots in these groups of states are shown; all if
  *     it is empty.
  *
@@ -178,6 +179,7 @@ const states = (value, path) => {
 export const checkedList = whole({
   order: oneOf(["auto", "state", "name", "battery", "added"]),
   group: oneOf(["none", "bridge", "tag"]),
+  rows: oneOf(["usual", "compact"]),
   states,
 });
 
