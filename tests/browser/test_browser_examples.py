@@ -182,7 +182,7 @@ def test_the_layer_of_the_tutorial_shows_the_voltage_of_the_robot(
         opened(tab, server, robots=1)
         text = tab.locator(".robot .voltage > text")
         expect(text).to_have_text(re.compile(r"^\d+\.\d V$"))
-        tab.locator(".webmap-layers summary").click()
+        tab.locator(".webmap-layers > summary").click()
         tab.get_by_role("checkbox", name="Voltages").uncheck()
         expect(text).to_be_hidden()
         tab.goto("about:blank")

@@ -9,6 +9,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from equipment.chromium import watched_tab
 from equipment.webmap_process import page_of
+from webmap.features.view.view import LAYERS
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -224,6 +225,21 @@ def test_each_robot_on_the_map_has_the_shape_of_its_state_in_the_list(page):
     ]
     robot = page.locator(".robot[data-name='Robot 5']")
     expect(robot.locator("> title")).to_have_text("Robot 5: Ann is driving")
+
+
+def test_a_free_robot_has_no_symbol_on_the_map(page):
+    mark = page.locator(".robot[data-name='Robot 6'] .state-mark")
+    expect(mark).to_be_visible()  # navigating
+    for free in (".robot[data-group=free]", ".cluster"):
+        expect(page.locator(f"{free} .state-mark:visible")).to_have_count(0)
+
+
+def test_the_list_of_layers_explains_the_colours_of_each_layer(page):
+    page.locator(".webmap-layers > summary").click()
+    page.locator(".webmap-layers #legend > summary").click()
+    explained = page.locator("#legend li b").all_text_contents()
+    assert set(LAYERS) <= set(explained)
+    expect(page.locator("#legend li").first).to_be_visible()
 
 
 def test_robots_that_overlap_are_one_mark_that_zooms_in(page):

@@ -123,7 +123,7 @@ def test_set_pose_on_the_page_does_not_report_a_jump_of_the_pose(chromium):
     ("opener", "open_"),
     [
         ("#bridges summary", "#bridges > details[open]"),
-        (".webmap-layers summary", ".webmap-layers[open]"),
+        (".webmap-layers > summary", ".webmap-layers[open]"),
         ("#help-open", "#help[open]"),
         (".webmap-export-go", ".webmap-export-menu:not([hidden])"),
     ],
@@ -142,7 +142,7 @@ def test_escape_closes_a_menu_and_sends_no_stop(open_console, opener, open_):
 def test_escape_sends_stop_while_this_page_drives_even_with_an_open_menu(open_console):
     page = open_console()
     select(page, "Robot 7")
-    page.locator(".webmap-layers summary").click()
+    page.locator(".webmap-layers > summary").click()
     hold(page.keyboard, "a", lambda: title(page).text_content() == "You are driving")
     page.keyboard.press("Escape")
     expect_state(page, "STOP active")
@@ -157,7 +157,7 @@ def test_escape_sends_stop_while_a_robot_of_this_page_navigates(
     page = open_console()
     select(page, "Robot 8")
     send_away(page)
-    page.locator(".webmap-layers summary").click()
+    page.locator(".webmap-layers > summary").click()
     page.keyboard.press("Escape")
     expect_state(page, "STOP active")
     end_stops(page.locator(".webmap-teleop .webmap-reset"))
@@ -166,7 +166,7 @@ def test_escape_sends_stop_while_a_robot_of_this_page_navigates(
 def test_the_space_bar_sends_stop_after_escape_closed_a_menu(open_console):
     page = open_console()
     select(page, "Robot 1")
-    page.locator(".webmap-layers summary").click()
+    page.locator(".webmap-layers > summary").click()
     page.keyboard.press("Escape")
     expect(page.locator(".webmap-layers[open]")).to_have_count(0)
     page.keyboard.press("Space")

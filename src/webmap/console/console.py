@@ -28,7 +28,7 @@ class Console:
     def __init__(
         self,
         given: "Sequence[Robot]" = (),
-        layers_off: Sequence[str] = ("Costmaps",),
+        layers_off: Sequence[str] = (),
     ) -> None:
         self.given = tuple(given)
         """The robots that the console was opened with, in that order."""

@@ -47,7 +47,7 @@ def open_console(
     floor: Path | None = None,
     title: str = PRODUCT,
     place: str | None = None,
-    layers_off: Sequence[str] = ("Costmaps",),
+    layers_off: Sequence[str] = (),
 ) -> Console:
     """Make the console the page at ``/``.
 
@@ -59,7 +59,8 @@ def open_console(
         title: The name of this installation.
         place: The name under which labels and views are stored; by default the URLs of
             the bridges. Use it for bridges whose port changes at each start.
-        layers_off: The layers that are off until the user switches them on.
+        layers_off: The layers that are off until the user switches them on; costmaps
+            are also off where several robots have one.
 
     Returns:
         The console, to add robots later.
@@ -103,7 +104,12 @@ def build(
     map.add_module("Teleop", SPEED, ROTATION_SPEED, holonomic=None, stop_place=stops)
     goals = map.add_module("GoalTool")
     poses = map.add_module("InitialPoseTool")
-    map.add_module("LayerSwitches", off=opened.layers_off)
+    map.add_module(
+        "LayerSwitches",
+        off=opened.layers_off,
+        several_off=["Costmaps"],
+        legend="#legend",
+    )
     map.add_module("MeasureTool")
     map.add_module("AlignTool")
     map.add_module("RouteTool", title)

@@ -5,6 +5,7 @@
 
 import math
 import re
+import zlib
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -266,6 +267,8 @@ class StateMark:
             svg.g(svg.circle(r=ACROSS / 2 + 3), self._use, class_="state-mark"),
             class_="upright",
         )
+        # Of the name, so that a robot has the same colour everywhere and always.
+        robot.svg.set_style("--hue", zlib.crc32(robot.name.encode()) % 360)
         # Above the body, and below what other modules draw.
         robot.svg.insert(list(robot.svg.children).index(robot.model) + 1, self.svg)
         self.on_odometry_update()

@@ -365,6 +365,7 @@ function fill(mark, robots) {
   const symbol = first.querySelector(".state-mark > use")?.getAttribute("href");
   const label = `${robots.length} robots${needs}, the worst: ${words}. Press to zoom in`;
   if (symbol) mark.querySelector("use")?.setAttribute("href", symbol);
+  mark.classList.toggle("idle", words === "free");
   mark.dataset.tone = first.getAttribute("data-tone") ?? "";
   if (mark.getAttribute("aria-label") === label) return;
   mark.setAttribute("aria-label", label);

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.browser
 
 HERE = Path(__file__).parents[1]
 WALL, FREE, BLUE = (0, 0, 0), (255, 255, 255), (0, 0, 255)
-LETHAL = pytest.approx((255, 76, 255), abs=3)
+LETHAL = pytest.approx((132, 126, 237), abs=3)
 
 POINT = """([selector, x, y]) => {
   const m = document.querySelector(selector).getScreenCTM();

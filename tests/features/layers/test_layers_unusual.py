@@ -183,7 +183,7 @@ def test_cells_of_other_values_are_marked_and_reported_once(
     for _ in range(3):
         link.publish("/map", above)
     (image,) = images(module.layer)
-    assert pixel(image, 0.75, 0.25)[3] == 255, "the other cells are drawn"
+    assert pixel(image, 0.75, 0.25)[3] > 0, "the other cells are drawn"
     assert pixel(image, 1.75, 0.25) == GREEN
     link.publish("/map", below)
     (image,) = images(module.layer)

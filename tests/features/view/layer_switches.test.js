@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { drawingNames, hidingRules } from "../../../src/webmap/features/view/layer_switches.js";
+import { hidingRules, switchesOf } from "../../../src/webmap/features/view/layer_switches.js";
 
 const LAYERS = [
   ["Scans", ".laserscan"],
@@ -25,24 +25,36 @@ test("one topic of a layer can be hidden alone", () => {
   );
 });
 
-const drawn = (...names) => names.map((layer) => ({ dataset: layer ? { layer } : {} }));
-
-test("a layer lists its topic names only if it has different ones", () => {
-  assert.deepEqual(drawingNames(drawn("rear/scan", "front/scan", "rear/scan")), [
-    "front/scan",
-    "rear/scan",
-  ]);
-  assert.deepEqual(drawingNames(drawn("scan", "scan", "")), []);
-  const many = Array.from({ length: 99 }, (_, number) => `/map_${number}`);
-  assert.equal(drawingNames(drawn(...many)).length, many.length);
+test("the layers of other robots are hidden, their health is not", () => {
+  const layers = [...LAYERS, ["Health", ".diagnostics"]];
+  assert.equal(
+    hidingRules(layers, { "Selected robot only": true }, "[a]", "r1").replaceAll(
+      ".laserscan,.floor, .map-file",
+      "ALL",
+    ),
+    '[a] .robot:not(.selected) :is(ALL) { display: none; }\n' +
+      '[a] :is(ALL)[data-layer-of]:not([data-layer-of="r1"]) { display: none; }',
+  );
 });
 
-test("topic names are grouped by robot, and robot_2 comes before robot_10", () => {
-  const topics = ["/robot_10/scan", "/robot_2/rear", "/robot_1/scan", "/robot_2/front"];
-  assert.deepEqual(drawingNames(drawn(...topics)), [
-    "/robot_1/scan",
-    "/robot_2/front",
-    "/robot_2/rear",
-    "/robot_10/scan",
-  ]);
+const drawn = (...found) => found.map(([topic, robot = ""]) => ({ topic, robot }));
+
+test("a layer has switches for its topics only if it has different ones", () => {
+  const two = drawn(["rear/scan"], ["front/scan"], ["rear/scan"]);
+  assert.deepEqual(switchesOf(two), { common: ["front/scan", "rear/scan"], own: [] });
+  assert.deepEqual(switchesOf(drawn(["scan"], ["scan"], [""])), { common: [], own: [] });
+  const alone = drawn(["/front", "Ann"], ["/rear", "Ann"]);
+  assert.deepEqual(switchesOf(alone).common, ["/front", "/rear"]);
+});
+
+test("a topic of several robots is common, one of a single robot is its own", () => {
+  const found = drawn(["/r_10/scan", "Bob"], ["/r_2/scan", "Ann"], ["/map"]);
+  found.push(...drawn(["costmap", "Ann"], ["costmap", "Bob"]));
+  assert.deepEqual(switchesOf(found), {
+    common: ["/map", "costmap"],
+    own: [
+      { topic: "/r_2/scan", robot: "Ann" },
+      { topic: "/r_10/scan", robot: "Bob" },
+    ],
+  });
 });

@@ -108,6 +108,9 @@ Colour = tuple[int, int, int, int]
 
 CLEAR: Colour = (0, 0, 0, 0)
 
+COST = (79, 70, 229)
+"""The hue of a costmap: one, so that neither robots nor scans are mistaken for it."""
+
 
 def _other_colour(value: int) -> Colour:
     """Return the colour of a cell that is neither a cost nor a probability."""
@@ -130,12 +133,8 @@ def _costmap_colour(value: int) -> Colour:
         return CLEAR
     if value > 100:
         return _other_colour(value)
-    if value == 100:
-        return (255, 0, 255, 255)
-    if value == 99:
-        return (0, 255, 255, 255)
-    red = 255 * value // 98
-    return (red, 0, 255 - red, 255)
+    inscribed = {99: 190, 100: 255}
+    return (*COST, inscribed.get(value, 30 + 110 * value // 98))
 
 
 # Indexed by the value of a cell as a byte: -1, which is unknown, is 255.
@@ -144,7 +143,7 @@ PALETTES: dict[str, list[Colour]] = {
     "costmap": [_costmap_colour(value) for value in range(256)],
     "raw": [(255 - value, 255 - value, 255 - value, 255) for value in range(256)],
 }
-"""The colours of each palette; those of RViz where RViz has the palette.
+"""The colours of each palette; those of RViz for a map and for raw values.
 
 A cell above 100 is green, and one below -1 is red to yellow: these values mean nothing.
 """

@@ -136,8 +136,8 @@ class OccupancyGrid(MapLayer):
 
     palette: Palette = "map"
     """``"map"``: free is white and occupied black. ``"costmap"``: free is transparent,
-    then blue to red, inscribed cyan and lethal purple. ``"raw"``: the 256 values of a
-    byte from white to black.
+    then one hue, denser with the cost. ``"raw"``: the 256 values of a byte from white
+    to black.
     """
 
     throttle: int = 0

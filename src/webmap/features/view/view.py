@@ -197,7 +197,9 @@ class LayerSwitches:
     """A list of the layers of the map, each with a switch.
 
     Only layers with present content are listed. A layer with different drawings, such
-    as two scans or two maps, also has a switch for each of them. Each browser stores
+    as two scans or two maps, also has a switch for each of them; drawings of one among
+    several robots are listed below its name. A further switch leaves only the layers of
+    the selected robot. Each browser stores
     its own choice. Robots still send data of layers that are off; WebMap sends no dots
     of them to the page.
 
@@ -206,9 +208,12 @@ class LayerSwitches:
         layers: A CSS selector for each name, in the order of the list; by default the
             names of all layers and of ``map.add_image``.
         off: Names that are off until the user switches them on.
+        several_off: Names that are off at first where several robots have such a layer.
+        legend: A CSS selector of the page's element that explains the colours; the list
+            ends with it.
 
     Raises:
-        ConfigError: If a name in ``off`` is not in ``layers``.
+        ConfigError: If a name in ``off`` or ``several_off`` is not in ``layers``.
     """
 
     def __init__(
@@ -217,10 +222,12 @@ class LayerSwitches:
         layers: Mapping[str, str] | None = None,
         *,
         off: Iterable[str] = (),
+        several_off: Iterable[str] = (),
+        legend: str = "",
     ) -> None:
         chosen = dict(all_layers() if layers is None else layers)
-        hidden = list(off)
-        for name in hidden:
+        hidden, several_hidden = list(off), list(several_off)
+        for name in hidden + several_hidden:
             if name not in chosen:
                 known = ", ".join(chosen)
                 raise ConfigError(
@@ -230,6 +237,11 @@ class LayerSwitches:
         self.browser_part = map.add_browser_part(
             self,
             "features/view/layer_switches.js",
-            {"layers": [list(item) for item in chosen.items()], "off": hidden},
+            {
+                "layers": [list(item) for item in chosen.items()],
+                "off": hidden,
+                "several_off": several_hidden,
+                "legend": legend,
+            },
             "features/view/view.css",
         )
