@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Page, expect
 
-from equipment.chromium import hold
+from equipment.chromium import end_stops, hold
 
 pytestmark = pytest.mark.browser
 
@@ -247,3 +247,21 @@ def test_the_stop_buttons_of_the_alarm_are_at_the_same_places_and_send_stop(
           e.click();
         }"""
     )
+
+
+@pytest.mark.parametrize("size", ["phone", "on its side", "small phone"])
+def test_the_results_of_stop_cover_no_list_on_a_phone(open_console, size):
+    page = open_console(size)
+    page.locator("#sheet").click()
+    page.keyboard.press("Shift+Escape")
+    results = page.locator(".webmap-stop-list")
+    expect(results).to_contain_text(f"{ROBOTS} of {ROBOTS} stopped, confirmed")
+    one, other = results.bounding_box(), page.locator("#panel").bounding_box()
+    apart = max(
+        other[start] - one[start] - one[size]
+        for start, size in (("x", "width"), ("y", "height"))
+    )
+    beside = one["x"] - other["x"] - other["width"]
+    assert max(apart, beside) >= 0
+    assert other["height"] > 90  # some of the list is left
+    end_stops(page.locator(".webmap-stop-list .webmap-reset"))
