@@ -222,9 +222,9 @@ function showNames({ selected }, robots, places, joined) {
   roomFor(names).forEach((room, at) => {
     if (room) shown.add(asked[at]);
   });
-  robots.forEach(({ element, id }, index) => {
+  robots.forEach(({ element, id, words }, index) => {
     turn(element, "nameless", !shown.has(index));
-    turn(element, "wordless", !worded.has(index) && id !== selected);
+    turn(element, "wordless", words !== "" && !worded.has(index) && id !== selected);
   });
 }
 
