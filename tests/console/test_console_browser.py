@@ -24,6 +24,17 @@ def test_a_robot_selected_in_the_list_is_selected_on_the_map(open_console):
     expect(row(page, "Robot 3")).to_have_attribute("aria-pressed", "true")
 
 
+def test_a_browser_can_install_the_console_in_a_window_of_its_own(open_console, demo):
+    page = open_console()
+    cdp = page.context.new_cdp_session(page)
+    found = cdp.send("Page.getAppManifest")
+    assert found["errors"] == []
+    assert found["manifest"]["startUrl"] == demo.url.partition("?")[0]
+    problems = cdp.send("Page.getInstallabilityErrors")["installabilityErrors"]
+    # The window of a test is a private one.
+    assert {problem["errorId"] for problem in problems} <= {"in-incognito"}
+
+
 def test_a_gamepad_without_the_standard_mapping_is_named_until_it_is_gone(open_console):
     page = open_console()
     pad = "{index: 0, id: 'Joystick', connected: true, mapping: '', buttons: []}"

@@ -211,6 +211,7 @@ def test_content_blocked_by_the_policy_is_logged_once(with_page, folder, caplog)
         ("/_webmap/made_page.css", "text/css; charset=utf-8"),
         ("/_webmap/icon.svg", "image/svg+xml; charset=utf-8"),
         ("/_webmap/web/drive.js", "text/javascript; charset=utf-8"),
+        ("/_webmap/manifest.webmanifest", "application/manifest+json"),
     ],
 )
 def test_files_of_the_package_are_served_with_their_media_type(

@@ -36,6 +36,7 @@ MEDIA_TYPES: Mapping[str, str] = {
     ".png": "image/png",
     ".svg": "image/svg+xml; charset=utf-8",
     ".webp": "image/webp",
+    ".webmanifest": "application/manifest+json",
 }
 """The served file types by suffix; a fixed table, since the machine's may differ."""
 
