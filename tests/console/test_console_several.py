@@ -83,15 +83,42 @@ def test_all_robots_of_a_search_are_sent_and_their_goals_cancelled(demo, open_co
     for _ in range(5):
         bar.get_by_role("button", name="Send goal…").click()
         expect(page.locator(".webmap-goal-word")).to_contain_text("Press on the map")
+        page.keyboard.down("Alt")
         box = page.locator("svg.webmap").bounding_box()
         page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
         page.mouse.down()
         # The goals of all robots are visible before the release.
         expect(page.locator(".webmap-goal-arrow")).to_have_count(demo.robots)
         page.mouse.up()
+        page.keyboard.up("Alt")
         with suppress(AssertionError):
             expect(navigating.first).to_be_attached(timeout=5000)
             break
     expect(navigating.first).to_be_attached()
     bar.get_by_role("button", name="Cancel goals").click()
     expect(navigating).to_have_count(0)
+
+
+def test_each_press_sends_the_next_of_several_robots(demo, open_console):
+    page = open_console()
+    page.locator("#show-all").click()
+    draw_box(page)
+    page.locator(".webmap-several").get_by_role("button", name="Send goal…").click()
+    box = page.locator("svg.webmap").bounding_box()
+    robots = page.locator("#robots .row .name").all_text_contents()
+    for number in range(demo.robots):
+        words = re.compile(rf"\({number + 1} of {demo.robots}\): Press on the map")
+        aiming = page.locator(".webmap-goal-word")
+        expect(aiming).to_have_text(words)
+        name = aiming.text_content().partition(" (")[0]
+        robots.remove(name)
+        x = box["x"] + box["width"] * (0.4 + 0.1 * number)
+        page.mouse.move(x, box["y"] + box["height"] / 2)
+        ground = page.locator(".webmap-ground-word")
+        expect(ground).to_have_text(re.compile(rf"^{name}: (free|unknown|wall)$"))
+        page.mouse.down()
+        expect(page.locator(".webmap-goal-arrow.aimed")).to_have_count(1)
+        page.mouse.up()
+    assert robots == [], "each robot was placed once"
+    expect(page.locator(".webmap-goal-go")).to_have_attribute("aria-pressed", "false")
+    expect(page.locator(".webmap-ground-word")).to_be_hidden()

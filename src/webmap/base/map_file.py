@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from webmap.base.errors import ConfigError
-from webmap.base.geometry import FARTHEST, Pose
+from webmap.base.geometry import FARTHEST, Affine, Pose
 from webmap.base.lined_yaml import LinedYaml
 from webmap.base.plain_files import resolved
 
@@ -58,6 +58,25 @@ class MapImage:
 
     image: Path
     """The image file of the map."""
+
+
+def cell_at(
+    cells: "NDArray[np.int8]", resolution: float, origin: Pose, x: float, y: float
+) -> int:
+    """Return the value of the cell at a place of the map's frame; -1 outside of it.
+
+    Args:
+        cells: Of shape (height, width), the lowest row first.
+        resolution: The side of a cell, in metres.
+        origin: The pose of the lower left corner of the first cell.
+        x: Metres along x.
+        y: Metres along y.
+    """
+    u, v = Affine.into_pose(origin).apply(x, y)
+    column, row = math.floor(u / resolution), math.floor(v / resolution)
+    height, width = cells.shape
+    inside = 0 <= column < width and 0 <= row < height
+    return int(cells[row, column]) if inside else -1
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,6 +39,8 @@ class Floor:
     """Rotation about the lower left corner, in radians."""
     bounds: tuple[float, float, float, float]
     """The known part: left, bottom, width and height in metres."""
+    plan: MapImage
+    """The map that the images show."""
 
     @property
     def matrix(self) -> geometry.Affine:
@@ -68,7 +70,8 @@ def load_floor(file: Path, folder: Path) -> Floor:
     height, width = (cells * plan.resolution for cells in plan.cells.shape)
     x, y, yaw = plan.origin.x, plan.origin.y, plan.origin.yaw
     bounds = known_part(plan)
-    return Floor(images["day"], images["night"], x, y, width, height, yaw, bounds)
+    day, night = images["day"], images["night"]
+    return Floor(day, night, x, y, width, height, yaw, bounds, plan)
 
 
 def paint(plan: MapImage, wall: str, unknown: str, free: str) -> "Image":

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import webmap
+from webmap.base.map_file import cell_at
 from webmap.console.bar import BridgeList, RefusedList
 from webmap.console.card_parts import RobotHealth
 from webmap.console.console import Console
@@ -216,6 +217,7 @@ class Frame:
 
     def __init__(self, map: "Map", title: str, floor: "Floor | None") -> None:
         self.map = map
+        self._floor = floor
         self._bounds = None if floor is None else floor.bounds
         self._looks = 0
         self._placed = False
@@ -224,6 +226,13 @@ class Frame:
         self.browser_part = map.add_browser_part(
             self, "console/console.js", {"title": tab, "bounds": self._bounds}
         )
+
+    def cell_at(self, x: float, y: float) -> int | None:
+        """Return the value of the floor's cell at a place; None without a floor."""
+        if self._floor is None:
+            return None
+        plan = self._floor.plan
+        return cell_at(plan.cells, plan.resolution, plan.origin, x, y)
 
     def place(self) -> None:
         """Show the floor, or the robots as soon as their poses are known."""

@@ -202,11 +202,19 @@ def robot_and_pose(map: Map, given: Any) -> tuple[Robot, float, float, float] | 
     """
     if not isinstance(given, dict):
         return None
-    robot = map.find_robot(given.get("robot"))
-    x, y, yaw = (given.get(name) for name in ("x", "y", "yaw"))
-    if robot is None or not (_finite(x) and _finite(y) and _finite(yaw)):
+    robot, place = map.find_robot(given.get("robot")), place_of(given)
+    yaw = given.get("yaw")
+    if robot is None or place is None or not _finite(yaw):
         return None
-    return robot, x, y, yaw
+    return robot, *place, yaw
+
+
+def place_of(given: Any) -> tuple[float, float] | None:
+    """Return ``x`` and ``y`` of a page's table; None if a number is missing."""
+    if not isinstance(given, dict):
+        return None
+    x, y = given.get("x"), given.get("y")
+    return (x, y) if _finite(x) and _finite(y) else None
 
 
 def _finite(value: object) -> TypeGuard[float]:

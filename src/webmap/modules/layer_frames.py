@@ -143,6 +143,11 @@ class Anchored(LayerFrames):
             self._frame = source
             self._place(source, stamp)
 
+    @property
+    def place(self) -> Affine:
+        """The transform from the layer's coordinates to the common map."""
+        return Affine.of_pose(self.alignment) @ self._offset
+
     def _on_frames(self) -> None:
         if self._frame is not None:
             self._place(self._frame, 0.0)

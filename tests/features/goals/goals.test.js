@@ -1,6 +1,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
+import { FakeElement } from "../../web/tools/fake_elements.js";
+import { GroundMark } from "../../../src/webmap/features/goals/ground_mark.js";
 import { assign, formation } from "../../../src/webmap/features/goals/goal_tool.js";
 import { look, ShownGoals } from "../../../src/webmap/web/tools/goals.js";
 
@@ -100,4 +102,48 @@ test("robots are assigned to goals so that no paths cross", () => {
       }
     }
   }
+});
+
+/** A mark on a map without a layout, the places it asked for, and its clock. */
+function groundMark() {
+  const asked = [];
+  const at = { now: 0 };
+  const view = { a: 50, b: 0, c: 0, d: -50, e: 0, f: 0 };
+  globalThis.ResizeObserver = class {
+    observe() {}
+  };
+  const map = { svg: new FakeElement(), view, onView: () => () => {} };
+  const mark = new GroundMark(map, (place) => asked.push(place), () => at.now);
+  return { mark, asked, at };
+}
+
+test("one place is asked for at a time, then the newest", () => {
+  const { mark, asked, at } = groundMark();
+  for (const x of [1, 2, 3]) mark.show({ x, y: 0 });
+  assert.deepEqual(asked, [{ x: 1, y: 0 }]);
+  mark.hear({ x: 1, y: 0, word: "free" });
+  assert.deepEqual(asked.at(-1), { x: 3, y: 0 });
+  mark.hear({ x: 1, y: 0, word: "wall" });
+  assert.equal(mark.word, "free", "a late answer is ignored");
+  mark.hear({ x: 3, y: 0, word: "wall" });
+  assert.equal(mark.word, "wall");
+  assert.equal(asked.length, 2, "a known place is not asked for again");
+  mark.show({ x: 9, y: 0 });
+  at.now = 400;
+  mark.show({ x: 9, y: 1 });
+  assert.equal(mark.word, "", "the word of another place does not stay");
+  at.now = 2000;
+  mark.show({ x: 9, y: 2 });
+  assert.deepEqual(asked.at(-1), { x: 9, y: 2 }, "a lost answer is not waited for");
+});
+
+test("where no map is, no word is shown, and the place is not asked for again", () => {
+  const { mark, asked } = groundMark();
+  mark.show({ x: 1, y: 0 });
+  mark.hear({ x: 1, y: 0, word: null });
+  assert.equal(mark.word, "");
+  assert.equal(asked.length, 1);
+  mark.hear({ x: 1, y: 0, word: "free" });
+  mark.show(null);
+  assert.equal(mark.word, "");
 });

@@ -304,10 +304,12 @@ def test_several_robots_get_goals_beside_each_other(tab):
         tab.keyboard.press("g")
         x, y = beside(tab, "New 0")
         tab.mouse.move(x, y)
+        tab.keyboard.down("Alt")
         tab.mouse.down()
         tab.mouse.move(x + 30, y)
         expect(tab.locator(".webmap-goal-arrow.aimed")).to_have_count(2)
         tab.mouse.up()
+        tab.keyboard.up("Alt")
         expect(tab.locator(".webmap-goal-arrow:is(.aimed, .asked)")).to_have_count(
             0, timeout=20_000
         )

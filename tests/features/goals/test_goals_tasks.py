@@ -88,6 +88,48 @@ class TestGoalMark:
         assert map.marked == [robots[1]]
 
 
+class Cells:
+    """A module that has one cell everywhere."""
+
+    def __init__(self, map, cell):
+        self.layer = SimpleNamespace(cell_at=lambda x, y: cell)
+
+
+class TestGround:
+    @pytest.mark.parametrize(
+        ("cells", "word"),
+        [
+            ([], None),
+            ([None], None),
+            ([-1], "unknown"),
+            ([24], "free"),
+            ([25], "unknown"),
+            ([64], "unknown"),
+            ([65], "wall"),
+            ([-1, 0, None], "free"),
+            ([0, 100, -1], "wall"),
+        ],
+    )
+    def test_the_page_gets_what_the_maps_have_at_a_place(self, map, cells, word):
+        tool = map.add_module("GoalTool")
+        sent = []
+        tool.browser_part.send = sent.append
+        for cell in cells:
+            map.add_module(Cells, cell)
+        tool.on_message({"ground": {"x": 1, "y": 2.5}})
+        assert sent == [{"ground": {"x": 1, "y": 2.5, "word": word}}]
+
+    @pytest.mark.parametrize(
+        "place", [None, {}, [1, 2], {"x": 1}, {"x": "1", "y": 2}, {"x": 1, "y": 1e999}]
+    )
+    def test_an_invalid_place_has_no_answer(self, map, place):
+        tool = map.add_module("GoalTool")
+        sent = []
+        tool.browser_part.send = sent.append
+        tool.on_message({"ground": place})
+        assert sent == []
+
+
 @pytest.mark.parametrize("spacing", [0.1, 21, float("nan")])
 def test_an_invalid_spacing_is_refused(map, spacing):
     with pytest.raises(ValueError, match=r"0\.3 to 20 m"):

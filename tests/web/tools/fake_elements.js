@@ -6,6 +6,7 @@ export class FakeElement extends EventTarget {
     this.children = [];
     this.classList = { toggle() {} };
     this.className = "";
+    this.dataset = {};
     this.disabled = this.hidden = this.isConnected = false;
     this.style = {};
     this.textContent = "";
@@ -18,6 +19,10 @@ export class FakeElement extends EventTarget {
   append(...children) {
     this.textContent += children.filter((child) => typeof child === "string").join("");
   }
+
+  after() {}
+
+  before() {}
 
   insertBefore(child) {
     child.isConnected = true;

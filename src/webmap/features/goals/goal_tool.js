@@ -2,6 +2,7 @@ import { SPACING } from "../../web/constants.js";
 import { chosen, poseOf, PressAim } from "../../web/tools/aim.js";
 import { button, html, onBeat, setAttribute, setHidden, setText } from "../../web/tools/elements.js";
 import { GoalMarks } from "./goal_marks.js";
+import { GroundMark } from "./ground_mark.js";
 import { look, sendGoal, ShownGoals } from "../../web/tools/goals.js";
 import { lay } from "../../web/tools/overlay.js";
 import { showNote, tool, toolName } from "../../web/tools/tool.js";
@@ -15,13 +16,16 @@ import { showNote, tool, toolName } from "../../web/tools/tool.js";
 /** @typedef {{button?: boolean, key?: string, spacing?: number}} Options */
 
 /**
- * Send the selected robots to a place: press there, drag for the heading, release. Or
- * move the mark with the arrow keys, turn it with Shift, and press Enter.
+ * Send the selected robots: press at the goal, drag for the heading, release. Or move the
+ * mark with the arrow keys, turn it with Shift, and press Enter. Each press sends the next
+ * robot; with Alt, or while **Formation** is pressed, it sends all that are left beside each
+ * other.
  *
  * The tool begins with its button, with `g`, or with a message `{active: true}`; Escape
  * ends it. It takes control where needed. A message `{reached: id}` removes the goal of
  * a robot. Sends `{goal: {robot, x, y, yaw}}` when the gate has accepted a goal,
- * `{cancel: robot}`, and `{mark: robot}` after a long press on a robot.
+ * `{cancel: robot}`, `{mark: robot}` after a long press on a robot, and `{ground: {x, y}}`
+ * to ask for the cell of the map under the aimed goal, answered by `{ground: {x, y, word}}`.
  *
  * Options: `button` (true), whether there are buttons; `key` ("g"); `spacing` (1), the
  * distance between several robots that are sent together, in metres.
@@ -56,11 +60,18 @@ class GoalTool {
      */
     this._goals = new Map();
     this._shown = new ShownGoals();
+    /** The robots that got a goal since the tool began. @type {Set<string>} */
+    this._placed = new Set();
+    /** Sends goals in the order of the presses. */
+    this._sending = Promise.resolve();
+    this._ground = new GroundMark(map, (place) => send({ ground: place }));
     this._aim = new PressAim(map, key, {
       mayBegin: () => map.selected !== null,
       changed: (active) => this._changed(active),
-      preview: (pose) => this._preview(pose),
-      done: (pose) => this._done(pose),
+      preview: (pose, alt) => this._preview(pose, alt),
+      done: (pose, alt) => this._done(pose, alt),
+      hover: (place) => this._ground.show(place, this._nextName()),
+      origin: () => poseOf(map, this._left()[0] ?? map.selected ?? ""),
     });
     this._wanted = false;
     this._go = button("webmap-aim-go webmap-goal-go", "", () => this._toggle());
@@ -82,7 +93,13 @@ class GoalTool {
       "Spacing in m ",
       this._spacing,
     );
-    const content = [this._apart, this._cancel, this._message];
+    this._formation = button("webmap-goal-formation", "Formation", () => {
+      const pressed = this._formation.getAttribute("aria-pressed") === "true";
+      this._formation.setAttribute("aria-pressed", `${!pressed}`);
+    });
+    this._formation.title = "Send all selected robots with one press (Alt and a press)";
+    this._formation.setAttribute("aria-pressed", "false");
+    const content = [this._formation, this._apart, this._cancel, this._message];
     this._panel = tool("webmap-aim webmap-goal", "Goals", this._go, ...content);
     this._marks = new GoalMarks(map, (robot) => this._end(robot));
     this._marking = new Marking(map, (robot) => send({ mark: robot }));
@@ -102,6 +119,7 @@ class GoalTool {
 
   destroy() {
     this._aim.destroy();
+    this._ground.destroy();
     this._marks.destroy();
     this._marking.destroy();
     for (const off of this._offs) off();
@@ -114,6 +132,7 @@ class GoalTool {
       this._aim.activate(message.active);
     }
     if (typeof message?.reached === "string") this._forget(message.reached);
+    if (message?.ground) this._ground.hear(message.ground);
   }
 
   _toggle() {
@@ -126,18 +145,44 @@ class GoalTool {
     if (this._wanted && !active && this._map.selected === null) {
       setText(this._message, "Select a robot first.");
     } else {
-      setText(this._message, active ? AIMING : "");
+      setText(this._message, active ? this._aiming() : "");
     }
     this._wanted = false;
+    this._placed.clear();
+    this._ground.show(null);
     this._show();
+  }
+
+  /** @returns {string[]} The selected robots that the next presses are for. */
+  _left() {
+    return chosen(this._map).filter((robot) => !this._placed.has(robot));
+  }
+
+  /** @returns {string} The name of the robot that the next press is for, if others are too. */
+  _nextName() {
+    const [next] = this._left();
+    return chosen(this._map).length > 1 && next ? this._name(next) : "";
+  }
+
+  /** @param {string} robot */
+  _name(robot) {
+    return this._drive.robots.get(robot)?.name ?? robot;
+  }
+
+  _aiming() {
+    const robots = chosen(this._map).length;
+    if (robots < 2) return AIMING;
+    return `${this._nextName()} (${this._placed.size + 1} of ${robots}): ${AIMING_NEXT}`;
   }
 
   /**
    * @param {Pose} pose
-   * @returns {[string, Pose][]} The goal of each selected robot.
+   * @param {boolean} alt
+   * @returns {[string, Pose][]} The robots that a press here is for, with their goals.
    */
-  _places(pose) {
-    const robots = chosen(this._map);
+  _places(pose, alt) {
+    const together = alt || this._formation.getAttribute("aria-pressed") === "true";
+    const robots = together ? this._left() : this._left().slice(0, 1);
     const apart = Number(this._spacing.value);
     const [least, most] = SPACING;
     const spacing = Number.isFinite(apart) && apart >= least ? Math.min(apart, most) : 1;
@@ -146,36 +191,45 @@ class GoalTool {
     return assign(from, places).map((place, i) => [robots[i], place]);
   }
 
-  /** @param {Pose | null} pose */
-  _preview(pose) {
+  /**
+   * @param {Pose | null} pose
+   * @param {boolean} alt
+   */
+  _preview(pose, alt) {
     for (const [robot, { state }] of this._goals) {
       if (state === "aimed") this._goals.delete(robot);
     }
-    for (const [robot, place] of pose ? this._places(pose) : []) {
+    this._ground.show(pose, this._nextName());
+    for (const [robot, place] of pose ? this._places(pose, alt) : []) {
       this._goals.set(robot, { pose: place, state: "aimed" });
     }
     this._show();
   }
 
-  /** @param {Pose} pose */
-  _done(pose) {
-    const places = this._places(pose);
-    this._aim.activate(false);
-    void this._ask(places);
+  /**
+   * @param {Pose} pose
+   * @param {boolean} alt
+   */
+  _done(pose, alt) {
+    const asked = this._places(pose, alt).map(([robot, place]) => {
+      const goal = { pose: place, state: /** @type {'asked' | 'sent'} */ ("asked") };
+      this._goals.set(robot, goal);
+      this._placed.add(robot);
+      return { robot, pose: place, goal };
+    });
+    if (this._left().length === 0) this._aim.activate(false);
+    else setText(this._message, this._aiming());
+    this._ground.show(null);
+    this._show();
+    this._sending = this._sending.then(() => this._ask(asked));
   }
 
-  /** @param {[string, Pose][]} places */
-  async _ask(places) {
+  /** @param {{robot: string, pose: Pose, goal: {state: 'aimed' | 'asked' | 'sent'}}[]} asked */
+  async _ask(asked) {
     /** @type {string[]} */
     const problems = [];
     /** @type {string[]} */
     const refused = [];
-    const asked = places.map(([robot, pose]) => {
-      const goal = { pose, state: /** @type {'asked' | 'sent'} */ ("asked") };
-      this._goals.set(robot, goal);
-      return { robot, pose, goal };
-    });
-    this._show();
     for (const { robot, pose, goal } of asked) {
       // A STOP, or another goal, arrived meanwhile.
       if (this._goals.get(robot) !== goal) continue;
@@ -191,9 +245,9 @@ class GoalTool {
       } catch (error) {
         if (this._goals.get(robot) === goal) this._goals.delete(robot);
         const why = error instanceof Error ? error.message : String(error);
-        const name = this._drive.robots.get(robot)?.name ?? robot;
         refused.push(robot);
-        problems.push(places.length > 1 ? `${name}: ${why}` : why);
+        const alone = chosen(this._map).length < 2;
+        problems.push(alone ? why : `${this._name(robot)}: ${why}`);
       }
       this._show();
     }
@@ -283,7 +337,7 @@ class GoalTool {
     const words = robots.length > 1 ? `Send goal to ${robots.length} robots` : "Send goal";
     setText(/** @type {Element} */ (this._go.lastElementChild), words);
     setAttribute(this._go, "aria-pressed", String(this._aim.active));
-    setHidden(this._apart, robots.length < 2);
+    for (const one of [this._apart, this._formation]) setHidden(one, robots.length < 2);
     setHidden(this._cancel, !robots.some((robot) => this._mayCancel(robot)));
     this._draw(robots);
   }
@@ -308,6 +362,8 @@ class GoalTool {
 
 const AIMING =
   "Press on the map and drag for the heading. Or use the keys: arrows move, Shift turns, Enter sends.";
+const AIMING_NEXT =
+  "Press on the map and drag for the heading, then the next. Alt and a press sends all that are left.";
 
 /** Duration of a long press on a robot, in ms. */
 const LONG = 500;

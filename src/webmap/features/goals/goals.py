@@ -3,7 +3,7 @@
 import logging
 from typing import TYPE_CHECKING, Any
 
-from webmap.core.map import robot_and_pose
+from webmap.core.map import place_of, robot_and_pose
 from webmap.core.registry import map_modules
 
 if TYPE_CHECKING:
@@ -17,12 +17,44 @@ SPACING = (0.3, 20.0)
 """Smallest and greatest distance between robots that are sent together, in metres."""
 
 
+FREE, OCCUPIED = 25, 65
+"""A cell below the first value is free, and from the second on a wall, as in map_saver;
+between them and below zero it is unknown."""
+
+
+def ground_at(map: "Map", x: float, y: float) -> str | None:
+    """Return what the maps have at a place: ``"free"``, ``"unknown"`` or ``"wall"``.
+
+    A wall of one map counts, whatever the others have there.
+
+    Returns:
+        None if no map is shown.
+    """
+    cells = []
+    for module in map.modules:
+        cell_at = getattr(getattr(module, "layer", module), "cell_at", None)
+        cell = None if cell_at is None else cell_at(x, y)
+        if cell is not None:
+            cells.append(cell)
+    if not cells:
+        return None
+    if max(cells) >= OCCUPIED:
+        return "wall"
+    known = [cell for cell in cells if cell >= 0]
+    return "free" if known and max(known) < FREE else "unknown"
+
+
 @map_modules.register
 class GoalTool:
     """A press on the map sets the selected robot's goal, a drag sets its heading.
 
-    The other selected robots get goals too, in a line across the heading, or in a grid
-    if they are more than four; each robot gets the place that keeps distances short.
+    With several selected robots each press is for the next one. With Alt it is for all:
+    they get goals in a line across the heading, or in a grid if they are more than
+    four, and each robot gets the place that keeps distances short.
+
+    While a goal is aimed, the page shows what the maps have there (free, unknown or
+    wall); a goal can be sent anywhere. A module of maps is a map if it, or its layer,
+    has a method ``cell_at(x, y)``, as of :class:`OccupancyGrid`.
 
     The tool begins with its button, its key or :meth:`aim`; nothing is sent before the
     operator presses on the map, and then the page sends the goal to the gate itself.
@@ -73,9 +105,14 @@ class GoalTool:
         self.browser_part.send({"reached": robot.id})
 
     def on_message(self, message: dict[str, Any]) -> None:
-        """Handle the page's messages about sent and canceled goals."""
+        """Handle sent and canceled goals, and judge the cell under an aimed goal."""
         goal, canceled = message.get("goal"), message.get("cancel")
-        if isinstance(goal, dict):
+        ground = place_of(message.get("ground"))
+        if ground is not None:
+            x, y = ground
+            word = ground_at(self.map, x, y)
+            self.browser_part.send({"ground": {"x": x, "y": y, "word": word}})
+        elif isinstance(goal, dict):
             sent = robot_and_pose(self.map, goal)
             if sent is not None:
                 self.map.notify_modules("on_goal_sent", *sent)

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from webmap.base.errors import ConfigError
-from webmap.base.map_file import MapImage, read_map
+from webmap.base.map_file import MapImage, cell_at, read_map
 from webmap.base.tasks import spawn
 from webmap.core.layer import Layer
 from webmap.core.registry import map_modules
@@ -65,6 +65,13 @@ class FileLayer(Layer):
         """Begin to read the file."""
         self.tiles = GridTiles(self.svg, self.palette, self._fail)
         spawn(self._read())
+
+    def cell_at(self, x: float, y: float) -> int | None:
+        """Return the value of the cell at a place, -1 outside; None without a map."""
+        image = self.image
+        if image is None or self.palette != "map":
+            return None
+        return cell_at(image.cells, image.resolution, image.origin, x, y)
 
     async def _read(self) -> None:
         try:

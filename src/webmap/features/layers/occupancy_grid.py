@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import FARTHEST
+from webmap.base.map_file import cell_at
 from webmap.base.tasks import spawn
 from webmap.core.problems import MessageProblems
 from webmap.features.layers.grid_picture import Palette, check_palette
@@ -262,6 +263,14 @@ class OccupancyGrid(MapLayer):
                 f"million: each {side} x {side} cells are drawn as one, with the "
                 "greatest of their values"
             )
+
+    def cell_at(self, x: float, y: float) -> int | None:
+        """Return the value of the cell at a place, -1 outside; None without a map."""
+        if self.cells is None or self.info is None or self.palette != "map":
+            return None
+        u, v = self.anchor.place.inverse.apply(x, y)
+        origin = self.info.origin.planar
+        return cell_at(self.cells, self.info.resolution, origin, u, v)
 
     def on_update(self, update: OccupancyGridUpdateMsg) -> None:
         """Change a rectangle of the grid; does nothing without a grid.

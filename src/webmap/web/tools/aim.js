@@ -95,9 +95,11 @@ function heading(from, to, otherwise) {
  * @typedef {object} Aims
  * @property {() => boolean} mayBegin Whether there is anything to aim for.
  * @property {(active: boolean) => void} changed Aiming started or ended.
- * @property {(pose: Pose | null) => void} preview The current pose; null when the press
- *     was cancelled.
- * @property {(pose: Pose) => void} done The press was released at this pose.
+ * @property {(pose: Pose | null, alt: boolean) => void} preview The current pose; null
+ *     when the press was cancelled. `alt`: whether Alt is held.
+ * @property {(pose: Pose, alt: boolean) => void} done The press was released at this pose.
+ * @property {(place: Point | null) => void} [hover] The mouse is over this place, in
+ *     metres, without a press; null when it has left the map.
  * @property {() => Pose | null} [origin] The start of the heading of a press without a
  *     drag; the selected robot if not given.
  * @property {boolean} [lasting] It stays active for several presses: a tool that aims
@@ -201,7 +203,7 @@ export class PressAim {
     if (!this._press && !this._mark) return;
     this._press = null;
     this._mark = null;
-    this._aims.preview(null);
+    this._aims.preview(null, false);
   }
 
   _listen() {
@@ -212,6 +214,7 @@ export class PressAim {
     svg.addEventListener("pointerdown", (event) => this._down(event), first);
     svg.addEventListener("pointermove", (event) => this._move(event), first);
     svg.addEventListener("pointerup", (event) => this._up(event), first);
+    svg.addEventListener("pointerleave", () => this.active && this._aims.hover?.(null), first);
     svg.addEventListener("pointercancel", () => this.drop(), first);
     svg.addEventListener("lostpointercapture", () => this.drop(), first);
     window.addEventListener("keydown", (event) => this._keyDown(event), { signal });
@@ -231,18 +234,18 @@ export class PressAim {
    * @returns {boolean} Whether the key moved the mark, or ended with it.
    */
   _keyed({ key, shiftKey, ctrlKey, altKey, metaKey, isComposing }) {
-    if (!this.active || this._press) return false;
-    if (ctrlKey || altKey || metaKey || isComposing) return false;
+    if (!this.active || this._press || ctrlKey || metaKey || isComposing) return false;
     const mark = this._mark;
     if (key === "Enter" && mark) {
       this._mark = null;
-      this._aims.done(mark);
+      this._aims.done(mark, altKey);
       return true;
     }
+    if (altKey) return false;
     const next = moved(this._map.view, mark ?? this._beginning(), key, shiftKey);
     if (!next) return false;
     this._mark = next;
-    this._aims.preview(next);
+    this._aims.preview(next, false);
     return true;
   }
 
@@ -275,6 +278,10 @@ export class PressAim {
     if (!this.active) return;
     event.stopImmediatePropagation();
     if (event.pointerId === this._press?.id) this._preview(event);
+    else if (!this._press && event.pointerType === "mouse" && this._aims.hover) {
+      const { x, y } = this._map.pointOf(event);
+      this._aims.hover(unapply(this._map.view, x, y));
+    }
   }
 
   /** @param {PointerEvent} event */
@@ -284,7 +291,7 @@ export class PressAim {
     this._map.suppressNextClick();
     const pose = this._preview(event);
     this._press = null;
-    if (pose) this._aims.done(pose);
+    if (pose) this._aims.done(pose, event.altKey);
   }
 
   /**
@@ -297,7 +304,7 @@ export class PressAim {
     const selected = press.robot === null ? null : poseOf(this._map, press.robot);
     const origin = this._aims.origin ? this._aims.origin() : selected;
     const pose = aim(this._map.view, press.from, this._map.pointOf(event), origin);
-    this._aims.preview(pose);
+    this._aims.preview(pose, event.altKey);
     return pose;
   }
 }
