@@ -96,10 +96,13 @@ def constants_js() -> str:
         ),
         "WORDS": (
             STATE_TEXTS,
-            "The text of each state of a robot, the first that is true; `{who}` is its "
-            "operator.",
+            "The text of each activity and condition of a robot, the worst first; "
+            "`{who}` is its operator.",
         ),
-        "SEEN": (list(SEEN), "The states that the display finds besides the gate's."),
+        "SEEN": (
+            list(SEEN),
+            "The activities that the display finds besides the gate's.",
+        ),
     }
     parts = ["// Made by tools/make_javascript.py: do not edit."]
     for name, (value, about) in constants.items():

@@ -140,7 +140,7 @@ def test_one_map_shows_ros_1_and_ros_2_robots_at_their_recorded_poses(tab, ros1,
         tab.goto("about:blank")
 
 
-DRIVEN = "Moving, not by WebMap"
+DRIVEN = "Moved by another program"
 """The recorded robot was driven by another program."""
 
 

@@ -24,6 +24,8 @@ NAMES = [
 ]
 STATES = ["stopped", "stopped", "lost", "battery_low", "driven", "navigating"]
 
+CONDITIONS = ("battery_low", "goal_failed", "blocked")
+
 GIVEN: dict[str, str] = {}
 """The state of each robot that is not free, by the id of the robot."""
 
@@ -31,7 +33,11 @@ GIVEN: dict[str, str] = {}
 def state(robot: webmap.Robot) -> RobotState:
     name = GIVEN.get(robot.id, "free")
     text = STATE_TEXTS[name].format(who="Ann", since="10:32")
-    return RobotState(name, text, text)
+    if name in CONDITIONS:
+        activity = "navigating" if name == "battery_low" else "free"
+        doing = STATE_TEXTS[activity]
+        return RobotState(name, activity, (name,), doing, doing, text.lower())
+    return RobotState(name, name, (), text, text, "")
 
 
 webmap.Robot.state = property(state)

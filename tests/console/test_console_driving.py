@@ -12,7 +12,7 @@ from equipment.chromium import hold
 # On a busy machine, a delayed page or robot stops.
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.serial]
 
-BLOCKED = "Not moving: blocked?"
+BLOCKED = "You are driving · not moving: blocked?"
 
 
 def test_the_bar_the_card_and_the_list_show_the_same_state(open_console):

@@ -29,7 +29,7 @@ def tab(chromium, tmp_path):
         expect(page.locator(".robot:not(.unplaced)")).to_have_count(4)
         wait_until_ready(page)
         select(page, "Robot 2")
-        expect_state(page, "Moving, not by WebMap", 30)
+        expect_state(page, "Autonomous", 30)
         yield page
 
 

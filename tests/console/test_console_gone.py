@@ -102,7 +102,7 @@ def test_a_robot_that_moves_by_itself_is_not_shown_as_free(chromium, tmp_path):
             page.goto(address)
             row = page.locator("#robots .row", has_text="Ghost")
             row.locator("button").first.click()
-            state = "Moving, not by WebMap"
+            state = "Moved by another program"
             expect(row).to_contain_text(state)
             expect(page.locator("#card .state")).to_contain_text(state)
             expect(page.locator(".webmap-teleop-title")).to_have_text(state)

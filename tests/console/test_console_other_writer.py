@@ -54,8 +54,11 @@ def test_the_bar_names_another_program_while_one_drives_and_the_alarm_afterwards
         expect(row).to_have_count(1, timeout=SOON)
         row.get_by_role("button").first.click()
         title = page.locator(".webmap-teleop-title")
-        expect(title).to_have_text("Another program is driving", timeout=SOON)
-        hold(page.keyboard, "w", lambda: title.text_content() == "You are driving")
+        moved = "Moved by another program: /teleop_node"
+        expect(title).to_have_text(moved, timeout=SOON)
+        expect(row.locator(".state")).to_contain_text(moved)
+        driving = "You are driving · moved by another program: /teleop_node"
+        hold(page.keyboard, "w", lambda: title.text_content() == driving)
         detail = page.locator(".drive-bar .webmap-teleop-detail")
         expect(detail).to_be_visible()
         expect(detail).to_contain_text(NAMED)

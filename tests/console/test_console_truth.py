@@ -35,13 +35,13 @@ HAS_GONE = f"""([x, y, far]) => {{
 }}"""
 
 
-def test_a_robot_with_a_goal_is_navigating_and_its_cancel_names_the_operator(
+def test_a_robot_with_a_goal_is_autonomous_and_its_cancel_names_the_operator(
     open_console,
 ):
     page = open_console()
     select(page, "Robot 2")
     send_away(page)
-    expect_state(page, re.compile("^Navigating"))
+    expect_state(page, re.compile("^Autonomous"))
     page.locator("#card").get_by_role("button", name="Cancel goal").click()
     goal = page.locator("#card .goal")
     expect(goal).to_contain_text("Goal cancelled: by ")

@@ -58,10 +58,14 @@ def test_every_state_of_the_gate_has_a_text_and_a_look():
         ("driven", "Ann is driving", "You are driving"),
         (
             "navigating_held",
-            "Navigating (Ann has control)",
-            "Navigating (you have control)",
+            "Autonomous (Ann has control)",
+            "Autonomous (you have control)",
         ),
-        ("blocked", "Not moving: blocked?", "Not moving: blocked?"),
+        (
+            "blocked",
+            "Ann is driving · not moving: blocked?",
+            "You are driving · not moving: blocked?",
+        ),
         ("stopped", "STOP active", "STOP active"),
     ],
 )
@@ -78,19 +82,19 @@ def test_an_operator_without_a_name_is_named_after_the_connection():
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"seen": MOVES}, "Moving, not by WebMap"),
+        ({"seen": MOVES}, "Moved by another program"),
         ({"seen": (0.04, 0.0, -0.09)}, "Free"),
-        ({"seen": (0.0, 0.0, -0.11)}, "Moving, not by WebMap"),
+        ({"seen": (0.0, 0.0, -0.11)}, "Moved by another program"),
         ({"seen": MOVES, "age": 1.1}, "Free"),
         ({"seen": MOVES, "age": None}, "Free"),
         ({"seen": MOVES, "measured": (0.0,) * 6}, "Free"),
-        ({"seen": MOVES, "doing": "barred"}, "Moving, not by WebMap"),
+        ({"seen": MOVES, "doing": "barred"}, "Moved by another program"),
         ({"seen": MOVES, "link": "down"}, "No connection for commands"),
         ({"seen": MOVES, "doing": "held", "holder": ANN}, "Ann has control"),
-        ({"seen": MOVES, "goal": SimpleNamespace(state="sent")}, "Navigating"),
-        ({"seen": MOVES, "goal": SimpleNamespace(state="reached")}, "Moving, not by"),
+        ({"seen": MOVES, "goal": SimpleNamespace(state="sent")}, "Autonomous"),
+        ({"seen": MOVES, "goal": SimpleNamespace(state="reached")}, "Moved by another"),
         ({"seen": MOVES, "over": 1.0}, "Still moving"),
-        ({"seen": MOVES, "over": 3.0}, "Moving, not by WebMap"),
+        ({"seen": MOVES, "over": 3.0}, "Moved by another program"),
     ],
 )
 def test_the_display_shows_motion_that_the_gate_does_not_measure(changes, text):
@@ -144,12 +148,62 @@ def test_a_robot_with_an_operator_or_an_active_stop_is_lost_but_never_gone(doing
 
 
 @pytest.mark.parametrize("doing", ["stopped", "unconfirmed"])
-def test_a_worse_state_does_not_hide_an_active_stop(doing):
+def test_a_condition_does_not_hide_an_active_stop(doing):
     found = state_of(robot(doing, link="down"))
-    assert found.text == f"No connection for commands, {STATE_TEXTS[doing]}"
+    assert found.text == f"{STATE_TEXTS[doing]} · no connection for commands"
     assert state_of(robot(doing, link="down", silent=4.0)).mine == (
-        f"Lost: no new pose, {STATE_TEXTS[doing]}"
+        f"{STATE_TEXTS[doing]} · lost: no new pose"
     )
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"charge": 0.1}, "Autonomous · battery low"),
+        (
+            {"charge": 0.1, "goal_failed": True},
+            "Autonomous · goal failed · battery low",
+        ),
+        ({"silent_for": 4.0}, "Autonomous · lost: no new pose"),
+    ],
+)
+def test_a_condition_is_beside_the_activity_and_does_not_hide_it(change, text):
+    found = state_of(robot("navigating")._replace(**change))
+    assert (found.text, found.activity) == (text, "navigating")
+
+
+def test_a_robot_that_nobody_moves_has_only_the_worst_reason_why_its_state_is_unknown():
+    assert state_of(robot("down", link="down", silent=4.0)).text == "Lost: no new pose"
+    found = state_of(
+        no_link(robot("free", silent=4.0, link="down"))._replace(charge=0.1)
+    )
+    assert found.text == "No connection to the bridge · battery low"
+    alarm = robot("settling", alarm="zero sent, still moving at 0.30 m/s")
+    assert state_of(alarm).text == "Does not obey: still moving"
+
+
+@pytest.mark.parametrize("doing", ["moving", "other"])
+def test_a_robot_that_moves_by_its_own_goal_or_plan_is_autonomous(doing):
+    writer = {"other_writer": "another program publishes" if doing == "other" else None}
+    one = robot(doing, **writer)
+    assert state_of(one).text == "Moved by another program"
+    assert LOOKS[state_of(one).name].tone == "warn"
+    assert state_of(one._replace(has_own_goal=True)).text == "Autonomous"
+    held = robot(doing, holder=ANN, **writer)._replace(has_own_goal=True)
+    assert state_of(held).text == "Autonomous (Ann has control)"
+    quiet = robot(seen=MOVES)._replace(has_own_goal=True)
+    assert state_of(quiet).text == "Autonomous"
+    assert state_of(robot()._replace(has_own_goal=True)).text == "Free"
+
+
+def test_another_program_is_named_as_far_as_its_nodes_are_known():
+    writer = "another program publishes to /cmd_vel (0.30 m/s, 0.00 rad/s)"
+    one = robot("other", other_writer=writer)._replace(writers=("/joy", "/tele"))
+    assert state_of(one).text == "Moved by another program: /joy, /tele"
+    driven = robot("driven", holder=ANN, other_writer=writer)._replace(
+        writers=("/joy",)
+    )
+    assert state_of(driven).mine == "You are driving · moved by another program: /joy"
 
 
 def test_the_battery_is_low_below_its_limit():
@@ -217,9 +271,7 @@ ALARMS = {"disobeying", "unreachable"}
 @pytest.mark.parametrize(
     ("first", "second"), list(itertools.combinations(BY_PRECEDENCE, 2))
 )
-def test_of_two_states_that_are_true_the_one_with_the_higher_precedence_is_shown(
-    first, second
-):
+def test_the_name_is_that_of_the_state_with_the_higher_precedence(first, second):
     if {first, second} <= OF_THE_GATE or {first, second} <= ALARMS:
         assert list(STATE_TEXTS).index(first) < list(STATE_TEXTS).index(second)
         return
@@ -233,5 +285,5 @@ def test_the_looks_and_their_groups_have_the_order_of_the_states():
     assert list(LOOKS) == states
     assert GROUPS[:3] == ("not obeying", "lost", "connecting")
     assert GROUPS[3:7] == ("stopped", "blocked", "goal failed", "battery low")
-    assert GROUPS[7:10] == ("moving, not by WebMap", "driven", "navigating")
+    assert GROUPS[7:10] == ("moved by another program", "driven", "autonomous")
     assert GROUPS[-1] == "free"

@@ -202,6 +202,9 @@ symbol ``goal-SHAPE`` for each shape.
 
 NO_GOAL = "No goal"
 
+GOAL_ON_MAP = "Goal shown on the map"
+"""Shown while the map shows a goal or plan of the robot, whoever sent it."""
+
 LINGER = 30.0
 """Seconds for which a reached or canceled goal is shown.
 
@@ -252,7 +255,8 @@ class GoalLine:
         past = ended is not None and time.monotonic() - ended > LINGER
         if goal is None or (past and goal.state != "failed"):
             self.element.set("data-tone", "none")
-            self._words.text, self._figures.text = NO_GOAL, ""
+            self._words.text = GOAL_ON_MAP if robot.has_own_goal else NO_GOAL
+            self._figures.text = ""
             return
         words, shape, tone = GOALS[goal.state]
         self._use.set(href=f"#goal-{shape}")

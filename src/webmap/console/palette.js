@@ -8,7 +8,7 @@ import { byId, html, setHidden, setText } from "../web/tools/elements.js";
  */
 
 /** @typedef {import('../web/drive.js').Drive} Drive */
-/** @typedef {{kind: string, name: string, act: () => void}} Entry */
+/** @typedef {{kind: string, name: string, state?: string, act: () => void}} Entry */
 
 /** The most lines that are shown. */
 const MOST = 12;
@@ -109,6 +109,7 @@ class Palette {
         { role: "option", id: `palette-${index}` },
         html("span", "palette-kind", {}, entry.kind),
         html("span", "palette-name", {}, entry.name),
+        html("span", "palette-state", {}, entry.state ?? ""),
       );
       line.addEventListener("click", () => this._do(entry));
       return line;
@@ -184,7 +185,8 @@ function entries() {
     for (const element of document.querySelectorAll(selector)) {
       const name = nameOf(element, part);
       if (name === "" || !usable(element)) continue;
-      all.push({ kind, name, act: () => press(element) });
+      const words = element.querySelector(".state");
+      all.push({ kind, name, state: words ? textOf(words) : "", act: () => press(element) });
     }
   }
   for (const label of document.querySelectorAll(".labels > .label")) {

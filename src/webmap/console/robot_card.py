@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from webmap import html
 from webmap.console.card_parts import GoalLine, OwnStop, SpeedTable
-from webmap.console.robot_list import AGE_LIMIT, StateShape
+from webmap.console.robot_list import AGE_LIMIT, StateShape, StateWords
 from webmap.console.robot_looks import UNKNOWN, heading, icon, look_of, number, sentence
 from webmap.features.cameras.camera_panel import CameraViews
 
@@ -80,8 +80,7 @@ class RobotCard:
         self._feed: RobotTriggers | None = None
         self._shape = StateShape()
         self._name = html.h2(dir="auto")
-        self._state = html.span(class_="holder")
-        self._mine = html.span(class_="you")
+        self._words = StateWords()
         self._reason = html.p(class_="reason")
         self._problems = html.p(class_="problems")
         self._problems.set("role", "alert")
@@ -153,7 +152,7 @@ class RobotCard:
         shape, tone, _ = look_of(robot)
         self._shape.show(shape)
         you = self.map.page.viewer.operator
-        self._state.text, self._mine.text = state.text_for(you.person), state.mine
+        self._words.show(state, you.person)
         self.element.set("data-state", state.name)
         reasons = (report.other_writer, report.reason) if report is not None else ()
         reason = " ".join(sentence(each) for each in reasons if each)
@@ -201,12 +200,7 @@ class RobotCard:
         head = html.div(
             *self._shape.elements, self._name, follow, close, class_="card-head"
         )
-        state = html.p(
-            html.span(text="Stale data", class_="old"),
-            self._state,
-            self._mine,
-            class_="state",
-        )
+        state = html.p(*self._words.elements, class_="state")
         state.set("role", "status")
         locate = action("locate", "icon-locate", "Set pose…")
         buttons = self._buttons = {about[0]: action(*about) for about in ACTIONS}

@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING, Any
 from webmap import html, svg
 from webmap.config.robot import BATTERY_LOW
 from webmap.console.robot_looks import GROUPS, LOOKS, battery_tone, needs_person
+from webmap.core.robot_state import beside
 
 if TYPE_CHECKING:
     from webmap import Element, Map, Robot
+    from webmap.core.robot_state import RobotState
 
 FULL = 18.0
 """Width of the charge in the battery symbol when the battery is full."""
@@ -116,20 +118,13 @@ class Row:
         self.robot = robot
         self._person = map.page.viewer.operator.person
         self._shape = StateShape()
-        self._state = html.span(class_="holder")
-        self._mine = html.span(class_="you")
-        self._words = html.span(
-            html.span(text="Stale data", class_="old"),
-            self._state,
-            self._mine,
-            class_="state",
-        )
+        self._words = StateWords()
         self._battery = BatteryMark()
         self._age = html.span(class_="age")
         self._button = html.button(
             *self._shape.elements,
             html.span(text=robot.name, class_="name", dir="auto", title=robot.name),
-            self._words,
+            html.span(*self._words.elements, class_="state"),
             self._battery.element,
             self._age,
             type="button",
@@ -167,9 +162,7 @@ class Row:
         # One fault of a bridge is one group, whatever else is lost.
         apart = address if now.name == "no_bridge" else ""
         self._shape.show(look.symbol)
-        text = now.text_for(self._person)
-        self._state.text, self._mine.text = text, now.mine
-        self._words.set("title", text)
+        self._words.show(now, self._person)
         self._battery.show(charge, robot.battery_low)
         for name, value in {
             "tone": look.tone,
@@ -207,6 +200,26 @@ class Row:
             self._age.set_age(age)
             self.element.set_age(age)
         self.on_state()
+
+
+class StateWords:
+    """The words of a robot's activity and of its conditions, each in its own colour."""
+
+    def __init__(self) -> None:
+        self._activity = html.span(class_="holder")
+        self._own = html.span(class_="you")
+        self._conditions = html.span()
+        old = html.span(text="Stale data", class_="old")
+        self.elements = (old, self._activity, self._own, self._conditions)
+
+    def show(self, state: "RobotState") -> None:
+        """Show a state of a robot."""
+        tone = LOOKS[state.activity].tone or None
+        self._activity.set("data-tone", tone).text = state.activity_text
+        self._own.set("data-tone", tone).text = state.own_text
+        self._conditions.text = beside("", state.conditions_text)
+        worst = LOOKS[state.conditions[0]].tone if state.conditions else None
+        self._conditions.set("data-tone", worst)
 
 
 class StateShape:

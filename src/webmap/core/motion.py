@@ -28,6 +28,7 @@ from webmap.config.motion import (
 from webmap.config.reading import Config, read_part
 from webmap.gate.limits import PLANE, Axes
 from webmap.gate.protocol import AssistSpec, RobotReport, RobotSpec
+from webmap.gate.rules.obedience import MOST_NAME, MOST_NODES
 from webmap.gate.specs import checked, checked_assist, polygon_around
 from webmap.poses.odometry import TypeQuery
 from webmap.ros.bridge import Bridge
@@ -163,6 +164,8 @@ class RobotMotion:
         self._own_map = Pose()
         self._type_query: TypeQuery | None = None
         self._ask_writers_at = 0.0
+        self.writers: tuple[str, ...] = ()
+        """Other nodes that publish the robot's velocity, as far as they are known."""
         robot_motions.add(self)
 
     @property
@@ -397,7 +400,7 @@ class RobotMotion:
         """Query the names of other publishers while another program is driving."""
         twist, now = self.config.twist, time.monotonic()
         if report.other_writer is None or twist is None:
-            self._ask_writers_at = now
+            self._ask_writers_at, self.writers = now, ()
         elif now >= self._ask_writers_at:
             self._ask_writers_at = now + ASK_WRITERS
             spawn(self._ask_writers(twist))
@@ -406,6 +409,8 @@ class RobotMotion:
         bridge = self._bridges.get("twist")
         others = None if bridge is None else await bridge.other_publishers(twist.topic)
         if others is not None and self.gate is not None and self.config.twist is twist:
+            sound = [name[:MOST_NAME] for name in others if name.isprintable()]
+            self.writers = tuple(sound[:MOST_NODES])
             self.gate.name_writers(self.id, tuple(others))
 
     def _gate(self) -> "Gates | GateClient":

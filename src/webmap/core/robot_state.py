@@ -3,7 +3,7 @@
 import asyncio
 import logging
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import datetime, timedelta
 from typing import NamedTuple
 
@@ -33,16 +33,16 @@ STATE_TEXTS = {
     "blocked": "Not moving: blocked?",
     "goal_failed": "Goal failed",
     "battery_low": "Battery low",
-    "other": "Another program is driving",
-    "moving": "Moving, not by WebMap",
+    "other": "Moved by {program}",
+    "moving": "Moved by another program",
     "changing": "Handing over",
     "stopping": "Stopping",
     "driven": "{who} is driving",
     "driven_by_you": "You are driving",
     "settling": "Still moving",
-    "navigating": "Navigating",
-    "navigating_held": "Navigating ({who} has control)",
-    "navigating_held_by_you": "Navigating (you have control)",
+    "navigating": "Autonomous",
+    "navigating_held": "Autonomous ({who} has control)",
+    "navigating_held_by_you": "Autonomous (you have control)",
     "barred": "Cannot be driven",
     "barred_held": "Cannot be driven ({who} has control)",
     "barred_held_by_you": "Cannot be driven (you have control)",
@@ -51,8 +51,8 @@ STATE_TEXTS = {
     "held_by_you": "You have control",
     "free": "Free",
 }
-"""The text of each state. Of the states that are true at once, the first one here is
-shown. The page has the same table, generated from this one."""
+"""The text of each activity and each condition, the worst first. The page has the same
+table, generated from this one."""
 
 YOUR_OTHER = "your other page"
 """Who has control, on the other pages of the same person."""
@@ -68,15 +68,20 @@ SEEN = (
     "gone",
     "lost",
     "down",
-    "goal_failed",
-    "battery_low",
     "other",
     "moving",
     "settling",
     "navigating",
 )
-"""States that the display finds besides the one that the gate reports. The page has the
-same list, generated from this one."""
+"""Activities that the display finds besides the one that the gate reports. The page has
+the same list, generated from this one."""
+
+UNKNOWN = SEEN[:7]
+"""Conditions in which nothing is known about a robot, unless the gate moves or stops
+it. Only the first is shown."""
+
+SEPARATOR = " \N{MIDDLE DOT} "
+"""Between the activity and the conditions."""
 
 LOST = LIMIT
 """Seconds without a pose, over an open connection, after which a robot is lost."""
@@ -92,26 +97,45 @@ QUIET = ("free", "barred", "down")
 
 
 class RobotState(NamedTuple):
-    """What a robot is doing."""
+    """What a robot is doing, and what needs attention besides."""
 
     name: str
-    """The state: a key of ``STATE_TEXTS``."""
+    """The worst of the activity and the conditions: a key of ``STATE_TEXTS``."""
 
-    text: str
-    """The text of the state."""
+    activity: str
+    """What the robot does: a key of ``STATE_TEXTS``."""
 
-    mine: str
-    """The text for the page that has control of the robot."""
+    conditions: tuple[str, ...]
+    """What needs attention, the worst first: keys of ``STATE_TEXTS``."""
 
-    elsewhere: str
-    """The text for other pages of the person who has control."""
+    activity_text: str
+    """The text of the activity."""
+
+    own_text: str
+    """The text of the activity for the page that has control of the robot."""
+
+    elsewhere_text: str
+    """The text of the activity for other pages of the person who has control."""
+
+    conditions_text: str
+    """The text of the conditions; empty if there are none."""
 
     person: str = ""
     """The person who has control of the robot; empty for none and for a program."""
 
-    def text_for(self, person: str) -> str:
-        """Return the text for the pages of a person, without control."""
-        return self.elsewhere if person == self.person else self.text
+    @property
+    def text(self) -> str:
+        """The activity and the conditions, such as "Autonomous · battery low"."""
+        return beside(self.activity_text, self.conditions_text)
+
+    @property
+    def mine(self) -> str:
+        """That text for the page that has control of the robot."""
+        return beside(self.own_text, self.conditions_text)
+
+    def activity_for(self, person: str) -> str:
+        """Return the text of the activity for the pages of a person, without control."""
+        return self.elsewhere_text if person == self.person else self.activity_text
 
 
 class Facts(NamedTuple):
@@ -149,23 +173,46 @@ class Facts(NamedTuple):
     battery_low: float = BATTERY_LOW
     """The charge below which the battery is low."""
 
+    has_own_goal: bool = False
+    """Whether a goal or plan of the robot's own navigation is active."""
+
+    writers: tuple[str, ...] = ()
+    """The nodes that publish its velocity, as far as they are known."""
+
 
 def state_of(facts: Facts) -> RobotState:
-    """Return what a robot is doing: the first state of the table that is true.
+    """Return what a robot is doing, with all conditions that are true.
 
     Stale data is left out: the page detects it by itself, even when it cannot reach
     this process.
     """
-    first: str = "watched" if facts.report is None else facts.report.doing
-    for name in (
-        _link_state(facts),
-        _pose_state(facts),
-        _own_motion(facts),
-        *_reported(facts),
-    ):
-        if name is not None and PRECEDENCE[name] < PRECEDENCE[first]:
-            first = name
-    return _state(first, facts)
+    activity = _activity(facts)
+    found = [_link_state(facts), _pose_state(facts), *_reported(facts, activity)]
+    names = sorted({name for name in found if name}, key=PRECEDENCE.__getitem__)
+    unknown = [name for name in names if name in UNKNOWN]
+    if unknown and activity in (*QUIET, "watched", "settling"):
+        activity = unknown[0]
+    left_out = (activity, *unknown[1:])
+    names = [name for name in names if name not in left_out]
+    first = min((activity, *names), key=PRECEDENCE.__getitem__)
+    conditions = tuple(names)
+    who, person = _holder(facts)
+    besides = [_text(name, facts, who) for name in conditions]
+    return RobotState(
+        first,
+        activity,
+        conditions,
+        _text(activity, facts, who),
+        _text(f"{activity}_by_you", facts, who) or _text(activity, facts, who),
+        _text(activity, facts, YOUR_OTHER),
+        SEPARATOR.join(text[:1].lower() + text[1:] for text in besides),
+        person,
+    )
+
+
+def beside(activity: str, conditions: str) -> str:
+    """Return the text of an activity with the text of conditions, if there are any."""
+    return f"{activity}{SEPARATOR}{conditions}" if conditions else activity
 
 
 def since_when(silent_for: float | None) -> str:
@@ -198,8 +245,21 @@ def _pose_state(facts: Facts) -> str | None:
     return "gone" if silent > GONE and _is_quiet(facts) else "lost"
 
 
-def _reported(facts: Facts) -> list[str]:
-    """Return the states that are true by facts beside the gate's own state."""
+def _activity(facts: Facts) -> str:
+    """Return the gate's state of a robot, or what the display knows better."""
+    report = facts.report
+    if report is None:
+        return "watched"
+    doing = report.doing
+    if doing in ("moving", "other"):
+        if facts.has_own_goal:
+            return "navigating" if report.holder is None else "navigating_held"
+        return doing if report.other_writer is None else "other"
+    return _own_motion(facts) or ("driven" if doing == "blocked" else doing)
+
+
+def _reported(facts: Facts, activity: str) -> list[str]:
+    """Return the conditions of a robot by reports, beside its activity."""
     names = []
     if facts.goal_failed:
         names.append("goal_failed")
@@ -212,49 +272,48 @@ def _reported(facts: Facts) -> list[str]:
         names.append("unreachable" if report.alarm == MAY_MOVE else "disobeying")
     if report.link == "down":
         names.append("down")
-    if report.other_writer is not None:
+    if report.doing == "blocked":
+        names.append("blocked")
+    by_own_goal = facts.has_own_goal and activity.startswith("navigating")
+    if report.other_writer is not None and not by_own_goal:
         names.append("other")
     return names
 
 
 def _own_motion(facts: Facts) -> str | None:
-    """Return the state of a moving robot whose odometry the gate does not receive."""
+    """Return the activity of a moving robot whose odometry the gate does not have."""
     report = facts.report
     if report is None or not _is_quiet(facts) or report.measured is not None:
         return None
     if report.link == "down" or not _moves(facts):
         return None
-    if report.goal is not None and report.goal.state not in OVER:
+    goes = report.goal is not None and report.goal.state not in OVER
+    if goes or facts.has_own_goal:
         return "navigating"
     over = facts.goal_over_for
     return "settling" if over is not None and over < BRAKES else "moving"
 
 
-def _state(name: str, facts: Facts) -> RobotState:
-    report = facts.report
-    holder = report.holder if report is not None else None
-    who, person = "Another operator", ""
-    if holder is not None:
-        who = isolated(holder.name or holder.connection)
-        person = holder.identity.person if holder.identity else ""
-    template = STATE_TEXTS[name]
-    since = since_when(facts.silent_for) if "{since}" in template else ""
-    text, elsewhere = (
-        _begun(template.format(who=each, since=since)) for each in (who, YOUR_OTHER)
-    )
-    mine = STATE_TEXTS.get(f"{name}_by_you", text)
-    if (
-        report is not None
-        and report.doing in ("stopped", "unconfirmed")
-        and PRECEDENCE[name] < PRECEDENCE["unconfirmed"]
-    ):  # a worse state does not hide that STOP is active
-        text = mine = elsewhere = f"{text}, {STATE_TEXTS[report.doing]}"
-    return RobotState(name, text, mine, elsewhere, person)
+def _holder(facts: Facts) -> tuple[str, str]:
+    """Return the name of who has control, and the person; empty for a program."""
+    holder = facts.report.holder if facts.report is not None else None
+    if holder is None:
+        return "Another operator", ""
+    person = holder.identity.person if holder.identity else ""
+    return isolated(holder.name or holder.connection), person
 
 
-def _begun(text: str) -> str:
-    """Return a text that begins with a capital letter."""
+def _text(name: str, facts: Facts, who: str) -> str:
+    """Return the text of a state; empty if the table does not have it."""
+    text = STATE_TEXTS.get(name, "")
+    since = since_when(facts.silent_for) if "{since}" in text else ""
+    text = text.format(who=who, since=since, program=named(facts.writers))
     return f"{text[:1].upper()}{text[1:]}"
+
+
+def named(nodes: Sequence[str]) -> str:
+    """Return the words for another program, with its nodes as far as they are known."""
+    return f"another program: {', '.join(nodes)}" if nodes else "another program"
 
 
 def _is_quiet(facts: Facts) -> bool:

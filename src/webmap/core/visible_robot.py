@@ -22,6 +22,7 @@ from webmap.core.robot_model import ModelImages, checked_model
 from webmap.core.robot_state import (
     Facts,
     RobotState,
+    named,
     since_when,
     state_of,
     state_rounds,
@@ -105,7 +106,8 @@ class VisibleRobot(MovableRobot):
     def state(self) -> RobotState:
         """What the robot is doing.
 
-        Its element in the scene has the state's name as ``data-state``.
+        Its element in the scene has the state's name as ``data-state``, and if there
+        are conditions, ``data-conditions`` and the activity as ``data-activity``.
         """
         feed, ended = self.feed, self.goal_ended_at
         return state_of(
@@ -120,8 +122,18 @@ class VisibleRobot(MovableRobot):
                 self.goal_failed,
                 self.charge,
                 self.battery_low,
+                self.has_own_goal,
+                self.motion.writers,
             )
         )
+
+    @property
+    def has_own_goal(self) -> bool:
+        """Whether a layer shows an active goal or plan of its own navigation.
+
+        WebMap did not send this goal: for a goal of WebMap see ``report.goal``.
+        """
+        return any(getattr(module, "shows_own_goal", False) for module in self.modules)
 
     @property
     def feed(self) -> OdometryFeed | None:
@@ -408,12 +420,18 @@ class VisibleRobot(MovableRobot):
         state, shown = self.state, self._state_shown
         if state == shown:
             return
-        if shown is not None and shown.name == state.name == "gone":
+        if shown is not None and shown[1:3] == state[1:3] == ("gone", ()):
             return  # since the same time, however it is rounded
         self._state_shown = state
         self.svg.set("data-state", state.name)
         since = since_when(self.silent_for) if state.name == "gone" else None
         self.svg.set("data-since", since)
+        activity = None if state.activity == state.name else state.activity
+        self.svg.set("data-activity", activity)
+        self.svg.set("data-conditions", " ".join(state.conditions) or None)
+        is_moved = "other" in (state.activity, *state.conditions)
+        program = named(self.motion.writers) if is_moved else None
+        self.svg.set("data-program", program)
         self.notify_modules("on_state", state)
 
     def _needs_poses(self) -> bool:

@@ -100,3 +100,11 @@ class RobotLayer(TopicLayer):
         else:
             self.placed.stand_in(*at, partial(self.draw, found))
         self.svg.set_age(self.bridge.lag, limit=self.age_limit)
+
+    def in_map(self, frame_id: str) -> bool:
+        """Return whether a frame is that of the robot's poses, so that both compare."""
+        tf, frames = self.robot.tf, self.robot.pose_source.frames
+        if tf is None or frames is None:
+            return frame_id.strip("/") in ("", "map")
+        name = frames.buffer.name(frame_id, tf["namespace"])
+        return name in ("", tf["map_frame"])

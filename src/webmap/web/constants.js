@@ -74,7 +74,7 @@ export const GOALS = Object.freeze({
   "cancelled": ["Goal cancelled", "cancelled"],
 });
 
-/** The text of each state of a robot, the first that is true; `{who}` is its operator. */
+/** The text of each activity and condition of a robot, the worst first; `{who}` is its operator. */
 export const WORDS = Object.freeze({
   "disobeying": "Does not obey: still moving",
   "unreachable": "No connection: may still be moving",
@@ -88,16 +88,16 @@ export const WORDS = Object.freeze({
   "blocked": "Not moving: blocked?",
   "goal_failed": "Goal failed",
   "battery_low": "Battery low",
-  "other": "Another program is driving",
-  "moving": "Moving, not by WebMap",
+  "other": "Moved by {program}",
+  "moving": "Moved by another program",
   "changing": "Handing over",
   "stopping": "Stopping",
   "driven": "{who} is driving",
   "driven_by_you": "You are driving",
   "settling": "Still moving",
-  "navigating": "Navigating",
-  "navigating_held": "Navigating ({who} has control)",
-  "navigating_held_by_you": "Navigating (you have control)",
+  "navigating": "Autonomous",
+  "navigating_held": "Autonomous ({who} has control)",
+  "navigating_held_by_you": "Autonomous (you have control)",
   "barred": "Cannot be driven",
   "barred_held": "Cannot be driven ({who} has control)",
   "barred_held_by_you": "Cannot be driven (you have control)",
@@ -107,7 +107,7 @@ export const WORDS = Object.freeze({
   "free": "Free",
 });
 
-/** The states that the display finds besides the gate's. */
+/** The activities that the display finds besides the gate's. */
 export const SEEN = Object.freeze([
   "disobeying",
   "unreachable",
@@ -116,8 +116,6 @@ export const SEEN = Object.freeze([
   "gone",
   "lost",
   "down",
-  "goal_failed",
-  "battery_low",
   "other",
   "moving",
   "settling",

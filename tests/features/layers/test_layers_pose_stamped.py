@@ -1,11 +1,13 @@
 """A published pose, such as a goal, is drawn as an arrow at its place."""
 
 import math
+import time
 
 import pytest
 from module_fakes import header, matrix_of, pose, to_root
 
 from webmap.base.errors import ConfigError
+from webmap.console.card_parts import GoalLine
 
 
 @pytest.fixture
@@ -105,3 +107,45 @@ def test_the_data_layer_attribute_omits_the_namespace_of_the_robot(link, robot):
     for topic, name in names.items():
         module = robot.add_module("LaserScanner", link, topic)
         assert module.svg.get("data-layer") == name
+
+
+def test_a_goal_on_the_map_is_a_goal_of_the_robot_until_it_is_reached(link, robot):
+    robot.add_module("PoseStamped", link, "/target")
+    robot.add_module("PoseStamped", link, "/goal_pose", name="goal")
+    link.publish("/target", {"header": header(), "pose": pose(8, 8, 0.0)})
+    assert not robot.has_own_goal
+    assert card_goal(robot) == "No goal"
+    link.publish("/goal_pose", {"header": header(), "pose": pose(8, 8, 0.0)})
+    assert robot.has_own_goal
+    assert card_goal(robot) == "Goal shown on the map"
+    link.publish("/odom", {"header": header(), "pose": pose(8, 8, 0.0)})
+    assert not robot.has_own_goal
+
+
+def test_a_plan_is_active_while_it_is_new_or_the_robot_is_on_it(
+    link, robot, monkeypatch
+):
+    module = robot.add_module("Path", link, "/plan")
+    now = time.monotonic()
+    line = [{"header": header(), "pose": pose(x, 0, 0.0)} for x in (0, 10)]
+
+    def own_goal(x, y, later):
+        link.publish("/odom", {"header": header(), "pose": pose(x, y, 0.0)})
+        monkeypatch.setattr(time, "monotonic", lambda: now + later)
+        return robot.has_own_goal
+
+    assert not own_goal(5, 0, 0.0)
+    link.publish("/plan", {"header": header(), "poses": line})
+    assert own_goal(5, 3, 1.0), "the plan is new"
+    assert own_goal(5, 0.2, 60.0), "a planner may send its plan once"
+    assert not own_goal(5, 3, 60.0), "the robot left the plan"
+    assert not own_goal(10, 0.2, 60.0), "the robot is at the end"
+    link.publish("/plan", {"header": header(), "poses": []})
+    assert not own_goal(5, 0.2, 60.0)
+    assert module.points == []
+
+
+def card_goal(robot):
+    line = GoalLine()
+    line.show(robot)
+    return line._words.text

@@ -129,7 +129,7 @@ test("speeds are shown with their sign, and a driven robot at standstill as bloc
   const back = describe(driven, "r1", { ...report, measured: [-0.98, 0, 0.1] }, true);
   assert.equal(back.detail, "-0.98 m/s, 0.10 rad/s");
   const wall = describe(driven, "r1", { ...report, doing: "blocked" }, true);
-  assert.equal(wall.title, "Not moving: blocked?");
+  assert.equal(wall.title, "You are driving · not moving: blocked?");
   assert.equal(
     wall.detail,
     "Sent: -1.00 m/s, 0.00 rad/s. Measured: 0.00 m/s, 0.00 rad/s.",
@@ -147,30 +147,53 @@ test("the operator who does not drive reads that this page has control", () => {
 });
 
 test("the title is the state of the gate or a state that only the display knows", () => {
-  const title = (doing, seen) => {
+  const title = (doing, state) => {
     const armable = doing === "free";
-    const more = { seen, since: "10:32" };
+    const more = { seen: { state, since: "10:32" } };
     return describe(STATUS, "r1", { ...REPORT, doing, armable }, true, more).title;
   };
   assert.equal(title("free", "free"), "Free");
-  assert.equal(title("free", "moving"), "Moving, not by WebMap");
-  assert.equal(title("free", "navigating"), "Navigating");
+  assert.equal(title("free", "moving"), "Moved by another program");
+  assert.equal(title("free", "navigating"), "Autonomous");
+  assert.equal(title("moving", "navigating"), "Autonomous");
+  assert.equal(title("other", "navigating"), "Autonomous");
   assert.equal(title("free", "gone"), "No pose since 10:32");
   assert.equal(title("barred", "gone"), "No pose since 10:32");
   assert.equal(title("down", "no_bridge"), "No connection to the bridge");
   assert.equal(title("down", "down"), "No connection for commands");
   // What the display showed a moment ago is older than the report of the gate.
   assert.equal(title("free", "driven"), "Free");
-  assert.equal(title("navigating", "gone"), "Navigating");
+  assert.equal(title("navigating", "gone"), "Autonomous");
   assert.equal(title("settling", "no_bridge"), "Still moving");
   assert.equal(doingOf({ ...REPORT, doing: "driven" }, "gone"), "driven");
+});
+
+test("the title has the conditions beside the activity, and hides neither", () => {
+  const title = (fields, seen) =>
+    describe({ ...STATUS, driven: "r1", settled: true }, "r1", { ...REPORT, ...fields }, true, { seen }).title;
+  const low = { state: "battery_low", activity: "free", conditions: "battery_low" };
+  assert.equal(title({}, low), "Free · battery low");
+  assert.equal(title({ ...ME, ...DRIVING }, low), "You are driving · battery low");
+  const away = { state: "lost", activity: "driven", conditions: "lost goal_failed" };
+  const blocked = { ...ME, ...DRIVING, doing: "blocked" };
+  assert.equal(
+    title(blocked, away),
+    "You are driving · not moving: blocked? · lost: no new pose · goal failed",
+  );
+  assert.equal(title({ doing: "stopped", latched: true }, low), "STOP active · battery low");
+});
+
+test("another program that moves the robot is named if its nodes are known", () => {
+  const seen = { state: "other", program: "another program: /joy" };
+  const { title } = describe(STATUS, "r1", { ...REPORT, doing: "other" }, true, { seen });
+  assert.equal(title, "Moved by another program: /joy");
 });
 
 test("a robot without a velocity topic is shown with the state of the display", () => {
   const title = (more) => describe(STATUS, "r1", null, true, more).title;
   assert.equal(title({}), "View only");
-  assert.equal(title({ seen: "watched" }), "View only");
-  assert.equal(title({ seen: "gone", since: "10:32" }), "No pose since 10:32");
+  assert.equal(title({ seen: { state: "watched" } }), "View only");
+  assert.equal(title({ seen: { state: "gone", since: "10:32" } }), "No pose since 10:32");
 });
 
 test("a lower-case name at the beginning of a sentence is not capitalized", () => {
@@ -208,7 +231,7 @@ test("another program that publishes velocities is shown in every state", () => 
   const mine = { ...STATUS, driven: "r1", settled: true };
   const stop = { by: "Ann", confirmed: true, why: "", id: "s1" };
   const states = [
-    [STATUS, { doing: "other" }, "Another program is driving"],
+    [STATUS, { doing: "other" }, "Moved by another program"],
     [mine, ME, "You have control"],
     [mine, { ...ME, ...DRIVING }, "You are driving"],
     [STATUS, { state: "stopped", doing: "stopped", latched: true, stop }, "STOP active"],

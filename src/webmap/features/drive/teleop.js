@@ -167,9 +167,8 @@ class Teleop {
     const pointers = { touch: this._touch.matches, stick: this._stick.wanted };
     const inputs = inputsOf({ ...pointers, gamepad: this._devices.gamepad });
     const drawn = this._map.world.querySelector(".robot.selected");
-    const seen = drawn?.getAttribute("data-state") ?? "";
-    const since = drawn?.getAttribute("data-since") ?? "";
-    const more = { verdict, request, inputs, seen, since };
+    const seen = drawn instanceof SVGElement ? drawn.dataset : {};
+    const more = { verdict, request, inputs, seen };
     const words = describe(status, robot, report, active, more);
     const idle = words.state === "free" || words.state === "ready";
     if (idle && this._devices.codeless) words.detail = NO_POSITIONS;

@@ -1,8 +1,12 @@
 """Paths of a robot's planner."""
 
 import math
+import time
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from webmap.base.geometry import Vector3
 from webmap.modules.declaration import TopicKind, layer
@@ -12,6 +16,9 @@ from webmap.modules.robot_layer import RobotLayer
 from webmap.ros.messages import PathMsg
 from webmap.ros.tf import Transform
 from webmap.scene import svg
+
+NEAR = 0.5
+"""Metres from a path, or from its end, within which a robot is there."""
 
 
 @layer(
@@ -63,6 +70,9 @@ class Path(RobotLayer):
     def build(self) -> None:
         """Make the line."""
         self._message: PathMsg | None = None
+        self._taken_at = 0.0
+        self._line = np.empty((0, 2))
+        """The drawn positions in the frame of the message."""
         self.line = self.add(
             svg.polyline(
                 fill="none",
@@ -72,6 +82,23 @@ class Path(RobotLayer):
                 vector_effect="non-scaling-stroke",
             )
         )
+
+    @property
+    def shows_own_goal(self) -> bool:
+        """Whether the newest path is new, or the robot is on it and not at its end.
+
+        Some planners send a path once, others again and again.
+        """
+        if self._message is None or len(self._line) == 0:
+            return False
+        if time.monotonic() - self._taken_at < self.age_limit:
+            return True
+        if not self.in_map(self._message.frame_id):
+            return False
+        place, own = self.robot.position, self.robot.pose_source.common_from_own
+        at = np.array(own.inverse.apply(place.x, place.y))
+        is_there = math.dist(at, self._line[-1]) < NEAR
+        return not is_there and distance(self._line, at) < NEAR
 
     @property
     def points(self) -> list[tuple[float, float]]:
@@ -94,7 +121,7 @@ class Path(RobotLayer):
             ProtocolError: If the path cannot be drawn.
         """
         super().take(message)
-        self._message = message
+        self._message, self._taken_at = message, time.monotonic()
         self.robot.notify_modules("on_path_update", self)
 
     def read(self, message: PathMsg) -> list[Vector3]:
@@ -119,4 +146,13 @@ class Path(RobotLayer):
 
     def draw(self, found: list[Vector3], at: Transform) -> None:
         """Draw the line as seen from above."""
+        self._line = np.array([(place.x, place.y) for place in found]).reshape(-1, 2)
         self.line.set_line([(rounded(x), rounded(y)) for x, y in flat(found, at)])
+
+
+def distance(line: NDArray[Any], at: NDArray[Any]) -> float:
+    """Return the distance of a position from a line of one or more positions."""
+    steps = np.diff(line, axis=0, append=line[-1:])
+    lengths = np.maximum((steps**2).sum(axis=1), 1e-12)
+    shares = np.clip(((at - line) * steps).sum(axis=1) / lengths, 0.0, 1.0)
+    return float(np.hypot(*(line + shares[:, None] * steps - at).T).min())

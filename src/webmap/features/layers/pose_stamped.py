@@ -68,6 +68,11 @@ class PoseStamped(RobotLayer):
         """The goal that is drawn until the robot reaches it."""
         self._count = 0
 
+    @property
+    def shows_own_goal(self) -> bool:
+        """Whether the map shows a goal that the robot has not reached."""
+        return self._goal_pose is not None
+
     def read(self, message: PoseStampedMsg) -> tuple[Pose, str]:
         """Return a pose that can be drawn, and its frame.
 
@@ -79,7 +84,7 @@ class PoseStamped(RobotLayer):
     def draw(self, found: tuple[Pose, str], at: Transform) -> None:
         """Move the arrow to the pose."""
         self.pose, frame_id = pose, _ = found
-        self._goal_pose = pose if self._ends and self._in_map(frame_id) else None
+        self._goal_pose = pose if self._ends and self.in_map(frame_id) else None
         self.arrow.set_pose(pose.x, pose.y, pose.yaw)
         self._count += 1
         # Identifies a goal that the goal tool has shown already.
@@ -96,14 +101,6 @@ class PoseStamped(RobotLayer):
         x, y = self.robot.pose_source.common_from_own.apply(pose.x, pose.y)
         at = self.robot.position
         return math.dist((x, y), (at.x, at.y)) < self.reached
-
-    def _in_map(self, frame_id: str) -> bool:
-        """Return whether a frame is that of the robot's poses, so that both compare."""
-        tf, frames = self.robot.tf, self.robot.pose_source.frames
-        if tf is None or frames is None:
-            return frame_id.strip("/") in ("", "map")
-        name = frames.buffer.name(frame_id, tf["namespace"])
-        return name in ("", tf["map_frame"])
 
 
 def arrow(length: float) -> str:

@@ -191,20 +191,19 @@ export function mayTake(report) {
   return report.armable && (!heldByAnother(report) || heldByProgram(report));
 }
 
-/** States of the gate while nobody has control and nothing stops the robot. */
-const QUIET = new Set(["free", "barred", "down"]);
+/** States of the gate that say less than the activity that the display finds. */
+const OPEN = new Set(["free", "barred", "down", "moving", "other"]);
 
 /**
  * Return what the driving panel shows of a robot: the gate's state while an operator or
- * a STOP has the robot, else that of the display, which has the whole precedence
- * (`state_of` in Python).
+ * a STOP has the robot, else the activity that the display finds (`state_of` in Python).
  *
  * @param {RobotReport} report
- * @param {string} seen The state that the display shows.
+ * @param {string} seen The activity that the display shows.
  * @returns {string} A name of `WORDS`.
  */
 export function doingOf({ doing }, seen) {
-  return QUIET.has(doing) && SEEN.includes(seen) ? seen : doing;
+  return OPEN.has(doing) && SEEN.includes(seen) ? seen : doing;
 }
 
 /** How long a note is shown whose cause no report shows, in ms. */

@@ -28,8 +28,18 @@ import { stopText } from "./stops.js";
  * @property {Verdict} [verdict] The result of a STOP of this page.
  * @property {Request} [request] The request for control of the robot.
  * @property {string} [inputs] The available inputs, as text.
- * @property {string} [seen] The state that the display shows: a name of `WORDS`.
- * @property {string} [since] When the display received the last pose of a robot that is gone.
+ * @property {Seen} [seen] What the display shows of the robot.
+ */
+
+/**
+ * What the display shows of a robot, as attributes of its element in the scene.
+ *
+ * @typedef {object} Seen
+ * @property {string} [state] The worst of the activity and the conditions.
+ * @property {string} [activity] A name of `WORDS`, if that is not `state`.
+ * @property {string} [conditions] Names of `WORDS`, with spaces between them.
+ * @property {string} [since] When the last pose of a robot came that is gone.
+ * @property {string} [program] The words for another program that moves it.
  */
 
 /** @typedef {import('../drive.js').Drive['status']} Status */
@@ -77,7 +87,8 @@ export function describe(status, robot, report, active, more = {}) {
  * @param {More} more
  */
 function ofRobot(status, robot, report, active, more) {
-  const { verdict, inputs = KEYS, seen = "", since = "" } = more;
+  const { verdict, inputs = KEYS, seen = {} } = more;
+  const activity = seen.activity ?? seen.state ?? "";
   if (verdict?.state === "unconfirmed" && !(report && isLatched(report))) {
     return description("unconfirmed", WORDS.unconfirmed, reasonOf(verdict));
   }
@@ -85,11 +96,11 @@ function ofRobot(status, robot, report, active, more) {
     return description("none", "No robot selected", "Select a robot to drive it.");
   }
   if (report === null) {
-    const title = wordsOf(seen in WORDS ? seen : "watched", { since });
+    const title = stateText(activity in WORDS ? activity : "watched", null, seen);
     return description("fixed", title, "This robot has no velocity topic.");
   }
-  const name = doingOf(report, seen);
-  const title = wordsOf(name, { report, since });
+  const name = doingOf(report, activity);
+  const title = stateText(name, report, seen);
   if (isLatched(report)) return ofStopped(title, status, report);
   if (name === "changing") {
     return description("taking", title, "The robot stops first.");
@@ -107,18 +118,36 @@ function ofRobot(status, robot, report, active, more) {
 }
 
 /**
- * Return the text of a state, for this page.
+ * Return the text of an activity with that of the conditions, for this page.
  *
- * @param {string} name Of `WORDS`.
- * @param {{report?: RobotReport, since?: string}} about
+ * @param {string} name The activity, or a worse state of the gate: of `WORDS`.
+ * @param {RobotReport | null} report
+ * @param {Seen} seen
  */
-function wordsOf(name, { report, since = "" }) {
+function stateText(name, report, seen) {
+  // The gate reports a blocked robot in place of a driven one.
+  const activity = name === "blocked" ? "driven" : name;
+  const names = [...(name === activity ? [] : [name]), ...(seen.conditions ?? "").split(" ")];
+  const conditions = [...new Set(names)].filter((each) => each in WORDS && each !== activity);
+  const texts = conditions.map((each) => wordsOf(each, report, seen));
+  const besides = texts.map((text) => ` · ${text.charAt(0).toLowerCase()}${text.slice(1)}`);
+  return wordsOf(activity, report, seen) + besides.join("");
+}
+
+/**
+ * @param {string} name
+ * @param {RobotReport | null} report
+ * @param {Seen} seen
+ */
+function wordsOf(name, report, { since = "", program = "another program" }) {
   /** @type {Readonly<Record<string, string>>} */
   const words = WORDS;
   const text = (report?.mine && words[`${name}_by_you`]) || words[name];
   const holder = report?.holder;
   const who = holder?.name || holder?.connection || "Another operator";
-  return begun(text.replace(/\{(who|since)\}/, (_, key) => (key === "who" ? who : since)));
+  /** @type {Record<string, string>} */
+  const values = { who, since, program };
+  return begun(text.replace(/\{(\w+)\}/, (_, key) => values[key]));
 }
 
 /**
