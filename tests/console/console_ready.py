@@ -85,9 +85,11 @@ def shown_state(page: Page):
 
 def expect_state(page: Page, text: str | re.Pattern, patience: float = 15.0) -> None:
     """Check that the bar, the card and the list show a state of the selected robot."""
-    line = page.locator("#robots .row:has([aria-pressed=true]) .state span:visible")
-    for where in (title(page), shown_state(page), line.first):
-        expect(where).to_have_text(text, timeout=patience * 1000)
+    if isinstance(text, str):
+        text = re.compile(f"^(Stale data)?{re.escape(text)}$")
+    line = page.locator("#robots .row:has([aria-pressed=true]) .state")
+    for where in (title(page), page.locator("#card .state"), line):
+        expect(where).to_have_text(text, timeout=patience * 1000, use_inner_text=True)
 
 
 COVERED = """(e, reach) => {

@@ -36,8 +36,8 @@ def state(robot: webmap.Robot) -> RobotState:
     if name in CONDITIONS:
         activity = "navigating" if name == "battery_low" else "free"
         doing = STATE_TEXTS[activity]
-        return RobotState(name, activity, (name,), doing, doing, text.lower())
-    return RobotState(name, name, (), text, text, "")
+        return RobotState(name, activity, (name,), doing, doing, doing, text.lower())
+    return RobotState(name, name, (), text, text, text, "")
 
 
 webmap.Robot.state = property(state)

@@ -23,7 +23,8 @@ ROW = max(1, math.isqrt(ROBOTS))
 """How many robots are beside each other."""
 
 if given := os.environ.get("STATE"):
-    state = RobotState(given, STATE_TEXTS[given], STATE_TEXTS[given])
+    text = STATE_TEXTS[given]
+    state = RobotState(given, given, (), text, text, text, "")
     webmap.Robot.state = property(lambda robot: state)
 
 

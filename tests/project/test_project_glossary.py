@@ -47,6 +47,8 @@ def found(name: str) -> Any:
     first, *others = name.split(".")
     if first == "report":
         value = get_type_hints(webmap.Robot.on_gate_report)["report"]
+    elif first == "state":
+        value = get_type_hints(webmap.Robot.state.fget)["return"]
     else:
         value = importlib.import_module(first)
     for other in others:

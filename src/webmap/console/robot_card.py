@@ -80,7 +80,7 @@ class RobotCard:
         self._feed: RobotTriggers | None = None
         self._shape = StateShape()
         self._name = html.h2(dir="auto")
-        self._words = StateWords()
+        self._words = StateWords(html.p())
         self._reason = html.p(class_="reason")
         self._problems = html.p(class_="problems")
         self._problems.set("role", "alert")
@@ -200,8 +200,7 @@ class RobotCard:
         head = html.div(
             *self._shape.elements, self._name, follow, close, class_="card-head"
         )
-        state = html.p(*self._words.elements, class_="state")
-        state.set("role", "status")
+        state = self._words.element.set("role", "status")
         locate = action("locate", "icon-locate", "Set pose…")
         buttons = self._buttons = {about[0]: action(*about) for about in ACTIONS}
         actions = html.div(*buttons.values(), class_="actions")

@@ -118,13 +118,13 @@ class Row:
         self.robot = robot
         self._person = map.page.viewer.operator.person
         self._shape = StateShape()
-        self._words = StateWords()
+        self._words = StateWords(html.span())
         self._battery = BatteryMark()
         self._age = html.span(class_="age")
         self._button = html.button(
             *self._shape.elements,
             html.span(text=robot.name, class_="name", dir="auto", title=robot.name),
-            html.span(*self._words.elements, class_="state"),
+            self._words.element,
             self._battery.element,
             self._age,
             type="button",
@@ -203,23 +203,34 @@ class Row:
 
 
 class StateWords:
-    """The words of a robot's activity and of its conditions, each in its own colour."""
+    """The words of a robot's activity and of its conditions, each in its own colour.
 
-    def __init__(self) -> None:
+    Args:
+        element: The element to fill.
+    """
+
+    def __init__(self, element: "Element") -> None:
+        self.element = element.set("class", "state")
+        self._shown: RobotState | None = None
         self._activity = html.span(class_="holder")
         self._own = html.span(class_="you")
         self._conditions = html.span()
         old = html.span(text="Stale data", class_="old")
-        self.elements = (old, self._activity, self._own, self._conditions)
+        element.append(old, self._activity, self._own)
 
-    def show(self, state: "RobotState") -> None:
-        """Show a state of a robot."""
+    def show(self, state: "RobotState", person: str) -> None:
+        """Show a state of a robot on a page of a person."""
+        if state == self._shown:
+            return  # a status that is written again may be read aloud again
+        self._shown = state
         tone = LOOKS[state.activity].tone or None
-        self._activity.set("data-tone", tone).text = state.activity_text
+        self._activity.set("data-tone", tone).text = state.activity_for(person)
         self._own.set("data-tone", tone).text = state.own_text
-        self._conditions.text = beside("", state.conditions_text)
-        worst = LOOKS[state.conditions[0]].tone if state.conditions else None
-        self._conditions.set("data-tone", worst)
+        self._conditions.remove()
+        if state.conditions:
+            self._conditions.text = beside("", state.conditions_text)
+            self._conditions.set("data-tone", LOOKS[state.conditions[0]].tone)
+            self.element.append(self._conditions)
 
 
 class StateShape:

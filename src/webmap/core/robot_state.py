@@ -134,7 +134,7 @@ class RobotState(NamedTuple):
         return beside(self.own_text, self.conditions_text)
 
     def activity_for(self, person: str) -> str:
-        """Return the text of the activity for the pages of a person, without control."""
+        """Return the text of the activity for pages of a person without control."""
         return self.elsewhere_text if person == self.person else self.activity_text
 
 
