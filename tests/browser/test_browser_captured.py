@@ -133,7 +133,7 @@ def test_one_map_shows_ros_1_and_ros_2_robots_at_their_recorded_poses(tab, ros1,
             assert 0 < box["x"] < 1200, "out of sight"
             assert 0 < box["y"] < 800, "out of sight"
             expect(row(tab, name)).to_contain_text(DRIVEN)
-        expect(tab.locator("#bridges summary")).to_have_text("2 bridges open")
+        expect(tab.locator("#bridges summary")).to_have_text("2 bridges connected")
         expect(tab.locator(".robot.stale")).to_have_count(0)
         expect(tab.locator(".laserscan.stale")).to_have_count(0)
         assert tab.locator(".webmap-notice").count() == 0
@@ -166,7 +166,7 @@ def test_an_unreachable_bridge_is_reported_and_the_other_robot_is_still_updated(
         expect_going_on(tab, "Anna", "ros1")
         expect(tab.locator(f"{robot('Gone')}.unplaced")).to_be_attached()
         bridges = tab.locator("#bridges")
-        expect(bridges.locator("summary")).to_have_text("1 of 2 bridges open")
+        expect(bridges.locator("summary")).to_have_text("1 of 2 bridges connected")
         bridges.locator("summary").click()
         line = bridges.locator("li").filter(has_text=gone)
         expect(line).to_contain_text("no connection")

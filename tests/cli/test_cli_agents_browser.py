@@ -146,7 +146,7 @@ def test_agents_that_come_and_end_while_a_page_is_open(chromium, tmp_path):
         expect(log.locator(".webmap-rosout-count")).to_have_text("No log lines yet.")
         with agent(tmp_path, one, router, "bay1"):
             expect(placed(page)).to_have_count(1, timeout=SOON)
-            expect(bridges).to_have_text("Bridge open", timeout=SOON)
+            expect(bridges).to_have_text("Bridge connected", timeout=SOON)
             expect(page.locator("#routers")).to_have_text("")
             lines = log.get_by_role("list", name="Log of bay1")
             expect(lines).to_contain_text("the battery is at", timeout=SOON)
@@ -175,7 +175,7 @@ def test_the_page_of_a_display_shows_why_its_router_is_not_there(chromium, tmp_p
         display(chromium, "zenoh://127.0.0.1:1", url) as page,
     ):
         expect(page.locator("#bridges summary")).to_have_text(
-            "Bridge open, no connection to a router", timeout=SOON
+            "Bridge connected, no connection to a router", timeout=SOON
         )
         page.locator("#bridges summary").click()
         line = page.locator("#bridges li[title='zenoh://127.0.0.1:1']")

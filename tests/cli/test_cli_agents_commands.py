@@ -157,7 +157,7 @@ def test_a_router_without_agents_is_wrong_and_the_advice_starts_one():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("doctor", "zenoh://h/a", "--stop-test", "bob"), "press Stop test"),
+        (("doctor", "zenoh://h/a", "--stop-test", "bob"), "press Run stop test"),
         (("discover", "zenoh://h/a", "--toml"), "run webmap discover --toml on the"),
     ],
 )

@@ -37,7 +37,7 @@ def test_a_recording_shows_the_robot_at_its_pose_and_allows_no_driving(
             re.compile(r"0:\d\d\.\d / 0:19\.9")
         )
         expect(page.get_by_label("Speed")).to_have_value("2")
-        expect(page.locator("#bridges")).to_contain_text("Bridge open")
+        expect(page.locator("#bridges")).to_contain_text("Bridge connected")
         card.locator(".more > summary").click()
         for name in ("Send goal…", "Cancel goal", "Set pose"):
             button = card.get_by_role("button", name=name)

@@ -46,15 +46,15 @@ def test_an_open_bridge_names_the_faults_of_its_frames(monkeypatch):
 @pytest.mark.parametrize(
     ("links", "text"),
     [
-        (["open"], "Bridge open"),
+        (["open"], "Bridge connected"),
         (["late"], "Bridge slow"),
         (["faulty"], "Frames faulty"),
-        (["faulty", "open"], "2 bridges open, faulty frames"),
+        (["faulty", "open"], "2 bridges connected, faulty frames"),
         (["lost"], "No connection to the bridge"),
         (["connecting"], "Connecting to the bridge"),
-        (["open", "open"], "2 bridges open"),
-        (["open", "lost"], "1 of 2 bridges open"),
-        (["open", "late", "lost"], "2 of 3 bridges open, 1 slow"),
+        (["open", "open"], "2 bridges connected"),
+        (["open", "lost"], "1 of 2 bridges connected"),
+        (["open", "late", "lost"], "2 of 3 bridges connected, 1 slow"),
     ],
 )
 def test_the_states_of_all_bridges_are_summarized_in_one_text(links, text):

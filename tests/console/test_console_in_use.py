@@ -221,7 +221,7 @@ def test_only_an_operator_can_run_the_slow_call_test(bridge, checkup, role, may)
         map, report = report_for(Viewer("v1", "Ann", role), bridge)
         press(report, "Check again")
         await until(lambda: not checkup.is_running)
-        asking = press(report, "Test slow call")
+        asking = press(report, "Test for delays")
         assert (asking.get("hidden") is None) is may
         press(report, "Run test")
         await until(lambda: not checkup.is_running)
@@ -239,7 +239,7 @@ def test_the_slow_call_test_asks_for_confirmation_and_can_be_cancelled(bridge, c
         divs = [each for each in report.walk() if getattr(each, "tag", "") == "div"]
         (question,) = [each for each in divs if each.get("role") == "group"]
         assert question.get("hidden") is not None
-        press(report, "Test slow call")
+        press(report, "Test for delays")
         assert question.get("hidden") is None
         assert "test while nobody drives" in question.text
         press(report, "Cancel")

@@ -1,9 +1,12 @@
 """The texts of the console about a robot."""
 
 import math
+from datetime import datetime, timedelta
 
 import pytest
 
+from webmap import html
+from webmap.console import bar
 from webmap.console.bar import summary
 from webmap.console.card_parts import cap, linear
 from webmap.console.robot_list import BatteryMark
@@ -14,6 +17,7 @@ from webmap.console.robot_looks import (
     number,
     sentence,
 )
+from webmap.core.refusals import Refusals
 from webmap.core.robot_state import STATE_TEXTS
 
 
@@ -93,11 +97,11 @@ def test_an_unknown_charge_is_not_shown():
 @pytest.mark.parametrize(
     ("links", "text"),
     [
-        (["open"], "Bridge open"),
+        (["open"], "Bridge connected"),
         (["lost"], "No connection to the bridge"),
         (["connecting"], "Connecting to the bridge"),
-        (["open", "open"], "2 bridges open"),
-        (["open", "lost"], "1 of 2 bridges open"),
+        (["open", "open"], "2 bridges connected"),
+        (["open", "lost"], "1 of 2 bridges connected"),
         ([], "No bridge yet"),
     ],
 )
@@ -112,12 +116,39 @@ def test_the_states_of_the_bridges_are_summarized(links, text):
         ([], ["connecting"], "No agent yet"),
         (["lost", "lost"], ["lost"], "No connection to the router"),
         (["lost"], ["open"], "No connection to the bridge"),
-        (["open", "open"], ["open", "connecting"], "2 bridges open"),
-        (["open"], ["lost"], "Bridge open, no connection to a router"),
-        (["open", "lost"], ["lost"], "1 of 2 bridges open, no connection to a router"),
+        (["open", "open"], ["open", "connecting"], "2 bridges connected"),
+        (["open"], ["lost"], "Bridge connected, no connection to a router"),
+        (
+            ["open", "lost"],
+            ["lost"],
+            "1 of 2 bridges connected, no connection to a router",
+        ),
     ],
 )
 def test_a_router_that_is_lost_or_without_agents_is_in_the_summary(
     links, routers, text
 ):
     assert summary(links, routers) == text
+
+
+def test_refused_messages_are_shown_for_a_minute_after_the_last_one(monkeypatch):
+    times = [datetime.now().astimezone()]
+    monkeypatch.setattr(bar, "now", lambda: times[-1])
+    monkeypatch.setattr(bar, "refusals", counted := Refusals())
+    element = html.div()
+    refused = bar.RefusedList(element, "operator")
+    (details,) = element.children
+
+    def is_shown(later: float) -> bool:
+        times.append(times[0] + timedelta(seconds=later))
+        refused.poll()
+        return details.get("hidden") is None
+
+    assert not is_shown(0)
+    counted.note("Ann", 3, "drive: too old", times[0])
+    assert is_shown(1)
+    assert is_shown(59)
+    assert not is_shown(61)
+    counted.note("Ann", 1, "drive: too old", times[-1])
+    assert is_shown(62)
+    assert "4 messages refused" in details.text

@@ -200,7 +200,7 @@ class TestDriving:
         bench.handle(protocol.Speeds("a", 0.5, 9.0))
         bench.drive_off()
         assert bench.written[-1].twist.vx == 0.5
-        assert bench.report().why == ("limit of the robot", "limit of the page")
+        assert bench.report().why == ("limit of the robot", "normal limit")
         bench.handle(protocol.Speeds("a", 0.2, 9.0))
         bench.hold(0.1, x=1.0)
         assert bench.written[-1].twist.vx == 0.2

@@ -56,8 +56,8 @@ def test_the_report_of_a_free_robot_includes_the_speed_limit_of_the_page(pages):
     _, quick = join(pages, 0.8, 1.2)
     _, slow = join(pages, 0.2, 0.4)
     pages.on_report(free(v_max=None, w_max=None))
-    assert cap_of(quick) == (0.8, 1.2, ["limit of the page"])
-    assert cap_of(slow) == (0.2, 0.4, ["limit of the page"])
+    assert cap_of(quick) == (0.8, 1.2, ["normal limit"])
+    assert cap_of(slow) == (0.2, 0.4, ["normal limit"])
     pages.on_report(free(v_max=0.5, w_max=1.0))
     assert cap_of(quick) == (0.5, 1.0, ["limit of the robot"])
 
@@ -67,7 +67,7 @@ def test_the_report_of_a_taken_robot_includes_the_speed_limit_of_the_page():
     bench.handle(protocol.Speeds("a", 0.8, 1.2))
     bench.take()
     report = bench.report()
-    assert (report.v, report.w, report.why) == (0.8, 1.2, ("limit of the page",))
+    assert (report.v, report.w, report.why) == (0.8, 1.2, ("normal limit",))
 
 
 def test_a_page_that_changes_its_speed_limit_receives_a_report_at_once(pages):
@@ -75,7 +75,7 @@ def test_a_page_that_changes_its_speed_limit_receives_a_report_at_once(pages):
     pages.on_report(free(v_max=None, w_max=None))
     assert cap_of(texts) == (0.3, 0.6, ["no limit stated"])
     connection.set_speeds(0.8, 1.2)
-    assert cap_of(texts) == (0.8, 1.2, ["limit of the page"])
+    assert cap_of(texts) == (0.8, 1.2, ["normal limit"])
 
 
 def test_a_page_that_sets_the_same_speed_limit_again_receives_nothing(pages):
@@ -95,7 +95,7 @@ def test_a_page_receives_no_report_before_hello(pages):
     connection.set_speeds(0.8, 1.2)
     assert texts == []
     pages.on_hello(protocol.Hello(connection.id))
-    assert cap_of(texts) == (0.8, 1.2, ["limit of the page"])
+    assert cap_of(texts) == (0.8, 1.2, ["normal limit"])
 
 
 def test_a_page_without_control_does_not_change_the_reported_speed(pages):
@@ -110,7 +110,7 @@ def test_a_page_without_control_does_not_change_the_reported_speed(pages):
 
 
 def test_an_invalid_speed_limit_of_a_page_counts_as_zero():
-    assert page_cap(math.nan, -1.0) == Cap(0.0, 0.0, "limit of the page")
+    assert page_cap(math.nan, -1.0) == Cap(0.0, 0.0, "normal limit")
 
 
 @given(LIMITS, LIMITS, LIMITS, LIMITS)

@@ -124,9 +124,9 @@ class TestLimits:
         return speed_in_force([*caps_of(spec(**changes)), *more])
 
     def test_the_lowest_limits_are_in_force_with_their_reasons(self):
-        page = Cap(0.4, 9.0, "limit of the page")
+        page = Cap(0.4, 9.0, "normal limit")
         assert self.in_force(page) == Speed(
-            0.4, 1.5, ("limit of the robot", "limit of the page")
+            0.4, 1.5, ("limit of the robot", "normal limit")
         )
 
     def test_a_robot_without_a_verified_stop_gets_the_slow_limits(self):

@@ -94,7 +94,7 @@ def doctor(
         )
     if stop_test is not None and any(is_agent_url(text) for text in url):
         raise click.UsageError(
-            "the gate of an agent alone moves its robots: press Stop test on the "
+            "the gate of an agent alone moves its robots: press Run stop test on the "
             "robot's card of webmap view"
         )
     if stop_test is not None:

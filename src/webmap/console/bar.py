@@ -1,6 +1,7 @@
 """Lists that unfold from the page's bar: bridges and refused messages."""
 
 from collections.abc import Callable, Mapping, Sequence
+from datetime import datetime, timedelta
 from typing import TYPE_CHECKING
 
 from webmap import html, refusals
@@ -9,8 +10,6 @@ from webmap.console.robot_looks import icon
 from webmap.poses.frames import frame_faults
 
 if TYPE_CHECKING:
-    from datetime import datetime
-
     from webmap import Bridge, Element
 
 WORST = ("lost", "connecting", "late", "faulty")
@@ -123,15 +122,16 @@ def summary(links: Sequence[str], routers: Sequence[str] = ()) -> str:
         return "No agent yet" if routers else "No bridge yet"
     if total == 1:
         text = {
-            "open": "Bridge open",
+            "open": "Bridge connected",
             "lost": "No connection to the bridge",
             "late": "Bridge slow",
             "faulty": "Frames faulty",
         }.get(links[0], "Connecting to the bridge")
     elif open_ == total and not late:
-        text = f"{total} bridges open"
+        text = f"{total} bridges connected"
     else:
-        text = f"{open_} of {total} bridges open" + (f", {late} slow" if late else "")
+        slow = f", {late} slow" if late else ""
+        text = f"{open_} of {total} bridges connected{slow}"
     if total > 1 and "faulty" in links:
         text += ", faulty frames"
     return f"{text}, no connection to a router" if lost else text
@@ -140,11 +140,19 @@ def summary(links: Sequence[str], routers: Sequence[str] = ()) -> str:
 SHOWN = 12
 """The greatest number of people that the list shows."""
 
+REFUSED_SHOWN = timedelta(minutes=1)
+
+
+def now() -> datetime:
+    """Return the time, with a time zone."""
+    return datetime.now().astimezone()
+
 
 class RefusedList:
     """A count of refused messages that unfolds into their senders and contents.
 
-    Hidden until a message is refused, and always hidden from viewers.
+    Shown for a minute after each refused message, and never to viewers. The log of
+    WebMap has every refusal.
 
     Args:
         element: The page's element to fill.
@@ -169,10 +177,11 @@ class RefusedList:
     def poll(self) -> None:
         """Show the present counts to an administrator, if they changed."""
         rows = refusals.rows
-        if not self._may or rows == self._shown:
+        is_recent = bool(rows) and now() - rows[0].at < REFUSED_SHOWN
+        if not self._may or (rows, is_recent) == self._shown:
             return
-        self._shown = rows
-        self._details.set(hidden=not rows)
+        self._shown = rows, is_recent
+        self._details.set(hidden=not is_recent)
         self._text.text = f"{counted(refusals.total, 'message')} refused"
         self._newest.text = rows[0].last if rows else ""
         self._list.clear()
@@ -180,7 +189,7 @@ class RefusedList:
             self._list.append(line(row.by, row.count, row.last, row.at))
 
 
-def line(by: str, count: int, last: str, at: "datetime") -> "Element":
+def line(by: str, count: int, last: str, at: datetime) -> "Element":
     """Return the number of one person's refused messages, and the last of them."""
     messages = counted(count, "message")
     return html.li(

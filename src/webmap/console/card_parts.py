@@ -13,9 +13,9 @@ from webmap.features.doctor.doctor_panel import entry
 if TYPE_CHECKING:
     from webmap import Element, Map, Robot
 
-COLUMNS = ("Sent", "Echoed", "Measured")
+COLUMNS = ("Sent", "Arrived", "Measured")
 
-OF_THE_PAGE = "limit of the page"
+OF_THE_PAGE = "normal limit"
 """Why a robot is driven slower than its own limits allow."""
 
 NOBODY_KNOWS = "unknown"

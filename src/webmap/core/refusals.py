@@ -4,10 +4,15 @@ A refused message does nothing. A large number still points to a problem: a brok
 a slow connection, or a person who probes WebMap.
 """
 
+import logging
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import datetime
+
+from webmap.base.text import counted
+
+log = logging.getLogger("webmap")
 
 MOST = 50
 """How many people are kept; the one whose last refusal is oldest is removed first."""
@@ -45,6 +50,7 @@ class Refusals:
 
     def note(self, by: str, count: int, last: str, at: datetime) -> None:
         """Add ``count`` messages of ``by``; ``last`` describes the last one."""
+        log.info("refused %s of %s: %s", counted(count, "message"), by, last)
         self.total += count
         before = self._rows.pop(by, None)
         if before is not None:

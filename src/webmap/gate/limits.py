@@ -146,7 +146,7 @@ def caps_of(spec: RobotSpec, tested: "StopRecord | None" = None) -> list[Cap]:
 
 def page_cap(v: float = math.inf, w: float = math.inf) -> Cap:
     """Return the cap that a page asks for; a negative or NaN limit becomes 0."""
-    return Cap(v if v >= 0 else 0.0, w if w >= 0 else 0.0, "limit of the page")
+    return Cap(v if v >= 0 else 0.0, w if w >= 0 else 0.0, "normal limit")
 
 
 def least(caps: Iterable[Cap]) -> Speed:

@@ -61,7 +61,7 @@ test("the sent, the echoed and the measured velocity are listed", () => {
   const figures = motions(report({ measured: [-0.3, 0, -0.001] }));
   assert.deepEqual(figures, [
     { name: "Sent", kind: "motion", text: "0.40 m/s", more: ", 0.00 rad/s" },
-    { name: "Echoed", kind: "motion", text: "unknown", more: "" },
+    { name: "Arrived", kind: "motion", text: "unknown", more: "" },
     { name: "Measured", kind: "motion", text: "-0.30 m/s", more: ", 0.00 rad/s" },
   ]);
 });

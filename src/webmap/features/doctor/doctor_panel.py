@@ -364,7 +364,7 @@ class TryCall:
         self._checkup = checkup
         self._may = role in MAY_TRY
         self.button: Element = html.button(
-            "Test slow call", type="button", class_="button"
+            "Test for delays", type="button", class_="button"
         )
         self.button.set(hidden=not self._may)
         self.button.on("click", lambda event: self._ask(True))
@@ -379,7 +379,7 @@ class TryCall:
             role="group",
             hidden=True,
         )
-        self.question.set("aria-label", "Test slow call")
+        self.question.set("aria-label", "Test for delays")
         self.poll()
 
     def poll(self) -> None:

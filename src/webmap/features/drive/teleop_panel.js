@@ -66,7 +66,7 @@ export class Panel {
       this._detail,
     );
     this._fold = button("webmap-teleop-fold", "Figures", () => this._turn());
-    this._fold.title = "Show sent, echoed and measured velocities, delays and distances";
+    this._fold.title = "Show the velocities sent, arrived and measured, delays and distances";
     this._fold.setAttribute("aria-expanded", "false");
     const confirmed = [this._reset.element, this._tester.element];
     const buttons = [this._lease, ...confirmed, this._stick, this._fold];

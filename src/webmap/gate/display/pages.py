@@ -8,7 +8,7 @@
     {"op": "robot", "robot": "r1", "name": "Bob", "state": "held",
      "holder": {"connection": "c5", "name": "Ann"}, "mine": true, "epoch": 3,
      "latched": false, "stop": null, "armed": false,
-     "v": 1.0, "w": 1.5, "why": ["limit of the page"], "link": "up",
+     "v": 1.0, "w": 1.5, "why": ["normal limit"], "link": "up",
      "sent": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0], "echoed": null,
      "measured": [0.0, 0.0, 0.0, 0.0, 0.0, 0.0], "alarm": null,
      "other_writer": null, "age": 42.0, "reaction": 0.492, "brake": 0.5,

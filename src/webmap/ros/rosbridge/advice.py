@@ -183,7 +183,7 @@ def blocking(facts: LinkFacts, url: str, dialect: str | None) -> Finding:
             BRIDGE,
             "A service that hangs may block its whole connection, as rosbridge for "
             "ROS 2 does by default before version 2.2; it was not tried.",
-            f"Press Test slow call in the report on the page, or run webmap doctor "
+            f"Press Test for delays in the report on the page, or run webmap doctor "
             f"{url} --try-call. {advice}",
         )
     return Finding(

@@ -72,7 +72,7 @@ export function motions({ sent, echoed, measured }) {
   };
   return [
     { name: "Sent", kind: "motion", ...text(sent) },
-    { name: "Echoed", kind: "motion", ...text(echoed) },
+    { name: "Arrived", kind: "motion", ...text(echoed) },
     { name: "Measured", kind: "motion", ...text(measured) },
   ];
 }
