@@ -78,7 +78,15 @@ class Bench:
         self.sent = []
         self.ways = []
         self.displays = Displays()
-        self.far = RemoteGate("bay3", NAME, self.owner, threading.RLock(), self.publish)
+        self.router_trouble = None
+        self.far = RemoteGate(
+            "bay3",
+            NAME,
+            self.owner,
+            threading.RLock(),
+            self.publish,
+            lambda: self.router_trouble,
+        )
 
     def publish(self, sample, only):
         self.sent.append(sample)
@@ -207,6 +215,23 @@ def test_a_silent_agent_is_lost_and_its_robots_are_reported_as_unreachable(conne
     assert last.reason == down.why
     connected.far.send(STOP)
     assert connected.arrive(0.7) == []
+
+
+def test_the_reports_name_the_router_as_soon_as_it_is_known_to_be_lost(connected):
+    connected.receive(REPORT, 0.1)
+    connected.far.beat(0.61)
+    connected.router_trouble = "no connection to the router at tcp/h:7447"
+    for now in (9.0, 9.1):
+        connected.far.beat(now)
+    reasons = [each.reason for each in connected.owner.of(RobotReport)[-2:]]
+    assert reasons == ["no connection to the agent bay3", connected.router_trouble]
+    assert connected.owner.of(RobotReport)[-1].alarm == MAY_MOVE
+    assert len(connected.owner.of(GateDown)) == 1
+    connected.router_trouble = None
+    connected.far.beat(9.2)
+    assert (
+        connected.owner.of(RobotReport)[-1].reason == "no connection to the agent bay3"
+    )
 
 
 @pytest.mark.parametrize(

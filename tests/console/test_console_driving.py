@@ -1,13 +1,14 @@
 """Driving in the console: the state, the stop test, and a robot that is blocked."""
 
 import re
+import time
 from contextlib import suppress
 
 import pytest
 from console_ready import assert_free, expect_state, select, send_away, title, unfold
 from playwright.sync_api import expect
 
-from equipment.chromium import hold
+from equipment.chromium import asleep, hold
 
 # On a busy machine, a delayed page or robot stops.
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.serial]
@@ -113,3 +114,20 @@ def test_a_robot_that_pushes_a_wall_is_shown_as_blocked(open_console):
     hold(page.keyboard, "s", lambda: "-" in detail.text_content())
     page.keyboard.up("s")
     page.get_by_role("button", name="Release control of Robot 2").click()
+
+
+def test_a_page_that_was_frozen_with_a_held_key_asks_to_release_it(open_console):
+    page = open_console()
+    select(page, "Robot 1")
+    hold(page.keyboard, "a", lambda: title(page).text_content() == "You are driving")
+    with asleep(page):
+        time.sleep(2.0)
+    blocked = "Input blocked: release all keys, then press again"
+    expect(title(page)).to_have_text(blocked)
+    page.wait_for_timeout(1000)
+    expect(title(page)).to_have_text(blocked)
+    page.keyboard.up("a")
+    expect(title(page)).not_to_have_text(blocked)
+    hold(page.keyboard, "a", lambda: title(page).text_content() == "You are driving")
+    page.keyboard.up("a")
+    page.get_by_role("button", name="Release control of Robot 1").click()

@@ -3,6 +3,7 @@
 import os
 import re
 import shutil
+import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -185,3 +186,18 @@ def watched_tab(browser: Browser, width: int, height: int) -> Iterator[Page]:
         context.close()
     complaints.allowed = page.allowed
     assert not complaints.unexpected, complaints.unexpected
+
+
+@contextmanager
+def asleep(tab):
+    """Stop the process of the page, as a phone does; the browser keeps its socket."""
+    browser = tab.context.browser.new_browser_cdp_session()
+    found = browser.send("SystemInfo.getProcessInfo")["processInfo"]
+    pids = [each["id"] for each in found if each["type"] == "renderer"]
+    for pid in pids:
+        os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        for pid in pids:
+            os.kill(pid, signal.SIGCONT)

@@ -62,8 +62,38 @@ def test_the_driver_of_a_robot_whose_agent_is_silent_gets_the_alarm_that_it_may_
         alarm = page.locator(".webmap-alarm")
         expect(alarm).to_contain_text("ROBOT MAY STILL BE MOVING", timeout=3_000)
         expect(alarm).to_contain_text(ALARM)
+        detail = page.locator(".webmap-teleop-detail")
+        expect(title).to_have_text("No connection: may still be moving")
+        expect(detail).to_contain_text("No connection to the agent bay3")
         page.keyboard.up("w")
         expect(row).to_contain_text("No connection: may still be moving")
         for each in reversed(processes):
             each.send_signal(signal.SIGCONT)
         expect(alarm).to_have_count(0, timeout=SOON)
+
+
+def test_the_panel_names_a_frozen_router_and_no_slow_connection(agent, chromium):
+    _, router = agent
+    options = ("--port", "0", "--no-browser")
+    with (
+        webmap("view", router, *options) as url,
+        watched_tab(chromium, 1280, 800) as page,
+    ):
+        page.goto(url)
+        row = page.locator("#robots .row").filter(has_text="Bob")
+        expect(row).to_have_count(1, timeout=SOON)
+        row.get_by_role("button").first.click()
+        panel = page.locator(".webmap-teleop-state")
+        expect(panel).to_contain_text("Free")
+        (process,) = (
+            each for each in psutil.Process().children() if "router" in each.cmdline()
+        )
+        process.send_signal(signal.SIGSTOP)
+        try:
+            expect(panel).to_contain_text("No connection to the agent bay3")
+            expect(panel).to_contain_text("o connection to the router", timeout=SOON)
+            expect(panel).not_to_contain_text("Slow connection")
+            expect(panel).not_to_contain_text("Command too old")
+        finally:
+            process.send_signal(signal.SIGCONT)
+        expect(panel).to_contain_text("Free", timeout=SOON)

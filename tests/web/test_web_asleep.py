@@ -1,12 +1,10 @@
 """A page that sleeps, as on a phone, shows the newest state first."""
 
-import os
-import signal
 import time
-from contextlib import contextmanager
 
 import pytest
 
+from equipment.chromium import asleep
 from equipment.devtools import Chromium
 from equipment.scene_host import wait
 from webmap.scene.wire.session import SceneSession
@@ -38,21 +36,6 @@ def opened(host, tab):
     tab.goto(host.url)
     tab.wait_for_selector(".robot circle")
     return host.one
-
-
-@contextmanager
-def asleep(tab):
-    """Stop the process of the page, as a phone does; the browser keeps its socket."""
-    browser = tab.context.browser.new_browser_cdp_session()
-    found = browser.send("SystemInfo.getProcessInfo")["processInfo"]
-    pids = [each["id"] for each in found if each["type"] == "renderer"]
-    for pid in pids:
-        os.kill(pid, signal.SIGSTOP)
-    try:
-        yield
-    finally:
-        for pid in pids:
-            os.kill(pid, signal.SIGCONT)
 
 
 def test_a_page_that_slept_shows_the_newest_pose_at_once(host, tab, opened):

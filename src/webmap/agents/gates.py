@@ -301,8 +301,9 @@ class Gates:
 
         def link(owner: object, lock: "threading.RLock") -> RemoteGate:
             assert isinstance(owner, GateClient)
+            put = partial(peer.put_gate, key)
             links.append(
-                RemoteGate(agent, display, owner, lock, partial(peer.put_gate, key))
+                RemoteGate(agent, display, owner, lock, put, lambda: peer.trouble)
             )
             return links[0]
 

@@ -67,6 +67,7 @@ class RemoteGate:
         lock: Held while the state changes.
         publish: Sends a sample to the agent, without waiting. The number chooses one
             of the connections; None is for all of them.
+        router_trouble: Returns why the router is not connected; None if it is.
 
     """
 
@@ -80,6 +81,7 @@ class RemoteGate:
         owner: GateListener,
         lock: "threading.RLock",
         publish: Callable[[bytes, int | None], None],
+        router_trouble: Callable[[], str | None] = lambda: None,
     ) -> None:
         self.agent = agent
         self.display = display
@@ -90,6 +92,7 @@ class RemoteGate:
         self._owner = owner
         self._lock = lock
         self._publish = publish
+        self._router_trouble = router_trouble
         self._order = Order()
         self._numbering = Numbering()
         self._heard_at = float("-inf")
@@ -215,8 +218,8 @@ class RemoteGate:
     def beat(self, now: float) -> None:
         """Answer the newest sample, and note when the agent is silent; at 20 Hz."""
         with self._lock:
-            if self.ready and now - self._heard_at > LOST:
-                self._lose(f"no connection to the agent {self.agent}", silent=True)
+            if now - self._heard_at > LOST:
+                self._note_silence()
             due = now - self._listed_at >= ANSWER
             if due:
                 self._listed_at = now
@@ -383,13 +386,25 @@ class RemoteGate:
                 return replace(message, connection=self.connection)
         return protocol.FromPage(self.connection, json.dumps(fields).encode())
 
+    def _note_silence(self) -> None:
+        """Report that nothing comes from the agent, and why if that changes."""
+        why = self._router_trouble() or f"no connection to the agent {self.agent}"
+        if self.ready:
+            self._lose(why, silent=True)
+        elif self._latest and why != self.trouble:
+            self.trouble = why
+            self._report_unreachable(why, silent=True)
+
     def _lose(self, why: str, *, silent: bool = False) -> None:
         """Report the loss of the agent; ``silent`` if nothing comes from its gate."""
         self.ready, self.trouble = False, why
+        self._report_unreachable(why, silent=silent)
+        self._owner.gone(protocol.GateDown(why))
+
+    def _report_unreachable(self, why: str, *, silent: bool) -> None:
         for report in list(self._latest.values()):
             driven = silent and self._drives(report)
             self._owner.hear(unreachable(report, why, driven=driven))
-        self._owner.gone(protocol.GateDown(why))
 
     def _drives(self, report: RobotReport) -> bool:
         """Return whether this display moved a robot, which perhaps got no zero yet."""

@@ -188,14 +188,14 @@ describe("an agent's gate without ticks", () => {
     assert.equal(bench.session.state, "open");
   });
 
-  test("makes the link late for its robots only", () => {
+  test("makes the link silent for its robots only", () => {
     const links = () =>
       ["r1", "r2", null].map((robot) => bench.session.linkTo(robot, bench.now));
     assert.deepEqual(links(), ["open", "open", "open"]);
     bench.run(50);
-    assert.deepEqual(links(), ["open", "late", "open"]);
+    assert.deepEqual(links(), ["open", "silent", "open"]);
     bench.run(1000);
-    assert.deepEqual(links(), ["open", "late", "open"]);
+    assert.deepEqual(links(), ["open", "silent", "open"]);
     bench.session.lost(bench.now);
     assert.deepEqual(links(), ["lost", "lost", "lost"]);
   });

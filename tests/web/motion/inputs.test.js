@@ -103,3 +103,22 @@ test("a key whose press the page did not see makes the keyboard neutral", () => 
   inputs.set("keys", { x: 1, y: 0, turn: 1 }, 100, { fresh: false });
   assert.deepEqual(inputs.axes, NEUTRAL);
 });
+
+test("an input that was held when the page froze is remembered until its release or a press", () => {
+  const inputs = rested();
+  inputs.set("keys", FORWARD, 0);
+  inputs.drop(10);
+  assert.equal(inputs.frozen, false);
+  inputs.set("keys", FORWARD, 10 + REST);
+  inputs.drop(300, { frozen: true });
+  assert.deepEqual([inputs.frozen, inputs.pressed, inputs.blocked], [true, false, true]);
+  inputs.drop(310);
+  inputs.set("stick", null, 320);
+  assert.equal(inputs.frozen, true);
+  inputs.set("keys", null, 330);
+  assert.equal(inputs.frozen, false);
+  inputs.set("keys", FORWARD, 1000);
+  inputs.drop(1100, { frozen: true });
+  inputs.set("stick", LEFT, 1100 + REST);
+  assert.deepEqual([inputs.frozen, inputs.blocked], [false, false]);
+});

@@ -12,6 +12,7 @@ const STATUS = {
   taking: false,
   settled: false,
   pressed: false,
+  frozen: false,
   blocked: false,
   axes: { x: 0, y: 0, turn: 0 },
   refusal: null,
@@ -181,6 +182,34 @@ test("the title has the conditions beside the activity, and hides neither", () =
     "You are driving · not moving: blocked? · lost: no new pose · goal failed",
   );
   assert.equal(title({ doing: "stopped", latched: true }, low), "STOP active · battery low");
+});
+
+test("a silent agent is named, also by the report of its loss, and no connection is slow", () => {
+  const silent = { ...STATUS, link: "silent", driven: "r1" };
+  const report = { ...REPORT, ...ME, ...DRIVING, gate: "bay3" };
+  const soon = describe(silent, "r1", report, true);
+  assert.deepEqual(
+    [soon.state, soon.title, soon.detail],
+    ["late", "No answer from the agent bay3", "Commands are ignored."],
+  );
+  const reason = "no connection to the router at tcp/h:7447";
+  const lost = { gate: "bay3", link: "down", doing: "down", armable: false, reason };
+  for (const state of ["free", "driving", "stopping"]) {
+    const later = describe({ ...silent, driven: null }, "r1", { ...REPORT, ...lost, state }, true);
+    assert.equal(later.title, "No connection for commands");
+    assert.equal(later.detail, "No connection to the router at tcp/h:7447.");
+  }
+});
+
+test("after a freeze with a held key the input is blocked, whatever was refused", () => {
+  const frozen = { ...STATUS, frozen: true, blocked: true };
+  const blocked = "Input blocked: release all keys, then press again";
+  const title = (status, fields) =>
+    describe({ ...frozen, ...status }, "r1", { ...REPORT, ...fields }, true).title;
+  assert.equal(title({}, {}), blocked);
+  assert.equal(title({ refusal: "command too old", refused: "drive" }, {}), blocked);
+  assert.equal(title({ driven: "r1", settled: true }, ME), blocked);
+  assert.equal(title({ blocked: false }, {}), "Free");
 });
 
 test("another program that moves the robot is named if its nodes are known", () => {

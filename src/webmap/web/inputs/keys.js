@@ -148,7 +148,7 @@ export class Keys {
     if (event.key === "Meta" || event.key === "OS") this._drive.goNeutral();
     // Some browsers press a button when Space is released.
     if (isSpace(event) && this._spaceUsed) event.preventDefault();
-    if (this._held.delete(event.code)) this._send();
+    if (this._held.delete(event.code) || this._drive.status.frozen) this._send();
   }
 
   /** @param {KeyboardEvent} event */

@@ -115,11 +115,12 @@ export class Stream {
    * Go neutral now; inputs have no effect until they are released and pressed again.
    *
    * @param {number} now
-   * @param {{drop?: boolean}} [how] `drop`: also forget the pressed inputs,
-   *     because this page may not receive their release.
+   * @param {{drop?: boolean, frozen?: boolean}} [how] `drop`: also forget the pressed
+   *     inputs, because this page may not receive their release. `frozen`: because the
+   *     page was frozen.
    */
-  goNeutral(now, { drop = false } = {}) {
-    if (drop) this.inputs.drop(now);
+  goNeutral(now, { drop = false, frozen = false } = {}) {
+    if (drop) this.inputs.drop(now, { frozen });
     else this.inputs.block(now);
     if (!this.lease) return;
     this.lease.firstNeutral = null;
@@ -140,7 +141,7 @@ export class Stream {
     this._attentive = attentive;
     const slept = gap < 0 || gap > ASLEEP;
     if (slept) this._sleptAt = now;
-    if (!attentive || slept) this.goNeutral(now, { drop: true });
+    if (!attentive || slept) this.goNeutral(now, { drop: true, frozen: slept });
     const loop = this._loop(robot);
     if (loop.tick === null || loop.state(now) !== "open") this.goNeutral(now);
     if (this.lease && this.pictures.blind(this.lease.robot)) this.goNeutral(now);

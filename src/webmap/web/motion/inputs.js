@@ -77,8 +77,18 @@ export class Inputs {
      */
     this._void = new Set();
     this._blocked = true;
+    /**
+     * Inputs that were pressed when the page froze: their release may have been lost.
+     * @type {Set<string>}
+     */
+    this._frozen = new Set();
     /** Since when all inputs are neutral, at the earliest since the last block. */
     this._quietSince = now;
+  }
+
+  /** Whether an input may be held since the page froze. */
+  get frozen() {
+    return this._frozen.size > 0;
   }
 
   /** Whether any input is not neutral, blocked or not. */
@@ -143,8 +153,11 @@ export class Inputs {
    * Forget the pressed inputs: another window may have received the release.
    *
    * @param {number} now
+   * @param {{frozen?: boolean}} [how] `frozen`: whether the page was frozen, so that they
+   *     may still be held.
    */
-  drop(now) {
+  drop(now, { frozen = false } = {}) {
+    if (frozen) for (const source of this._pressed.keys()) this._frozen.add(source);
     this._pressed.clear();
     this._void.clear();
     this.block(now);
@@ -156,6 +169,7 @@ export class Inputs {
    * @param {boolean} counts
    */
   _press(source, axes, counts) {
+    this._frozen.clear();
     this._pressed.set(source, axes);
     if (counts) this._blocked = false;
     else this._void.add(source);
@@ -167,6 +181,7 @@ export class Inputs {
    */
   _release(source, now) {
     this._void.delete(source);
+    this._frozen.delete(source);
     if (this._pressed.delete(source) && !this.pressed) this._quietSince = now;
   }
 }

@@ -82,6 +82,7 @@ export class Pilot {
       early: this._stream.early(choice),
       pressed: this.inputs.pressed,
       blocked: this.inputs.blocked,
+      frozen: this.inputs.frozen,
       axes: this.inputs.axes,
       refusal: refusal?.text ?? null,
       refused: refusal?.what ?? "",

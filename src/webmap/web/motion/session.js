@@ -142,12 +142,14 @@ export class Session {
   /**
    * @param {string | null} robot The robot that the operator has chosen.
    * @param {number} now
-   * @returns {LinkState} The state of the link to that robot's gate: late also while that
-   *     gate does not answer.
+   * @returns {LinkState | 'silent'} The state of the link to that robot's gate; silent if
+   *     the display answers, but not the gate of the robot's agent.
    */
   linkTo(robot, now) {
-    const late = this.state === "open" && this.loops.of(robot).state(now) !== "open";
-    return late ? "late" : this.state;
+    const { own } = this.loops;
+    const loop = this.loops.of(robot);
+    if (this.state !== "open" || loop.state(now) === "open") return this.state;
+    return loop === own ? "late" : "silent";
   }
 
   /**

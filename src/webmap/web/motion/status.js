@@ -69,7 +69,7 @@ export function inputsOf({ touch, stick, gamepad }) {
  * @returns {Description}
  */
 export function describe(status, robot, report, active, more = {}) {
-  const link = ofLink(status);
+  const link = ofLink(status, report);
   if (link) return link;
   const state = ofRobot(status, robot, report, active, more);
   const { other_writer: other, hooks = [] } = report ?? {};
@@ -178,8 +178,11 @@ function velocityText(velocity) {
   return `${signed(speedAlong(velocity) ?? 0)} m/s, ${signed(velocity[2])} rad/s`;
 }
 
-/** @param {Status} status */
-function ofLink({ link }) {
+/**
+ * @param {Status} status
+ * @param {RobotReport | null} report
+ */
+function ofLink({ link }, report) {
   if (link === "connecting") return description("connecting", "Preparing input", "Connecting.");
   if (link === "lost") {
     return description(
@@ -194,6 +197,10 @@ function ofLink({ link }) {
       "Slow connection",
       "Command too old (over 300 ms): ignored",
     );
+  }
+  // As soon as the display counts the agent as lost, the report has the reason.
+  if (link === "silent" && report?.link !== "down") {
+    return description("late", `No answer from the agent ${report?.gate}`, "Commands are ignored.");
   }
   return null;
 }
@@ -249,7 +256,7 @@ function ofInputs(status, report, title) {
   if (status.refusal && status.refused === "stop-test") {
     return description("ready", title, sentence(status.refusal));
   }
-  return status.pressed && status.blocked ? inputBlocked() : null;
+  return isBlocked(status) ? inputBlocked() : null;
 }
 
 /**
@@ -262,12 +269,13 @@ function ofInputs(status, report, title) {
  */
 function ofTaking(status, report, title) {
   if (status.taking) return gettingReady();
-  if (report.state === "stopping") return null;
+  if (report.state === "stopping" && report.link === "up") return null;
   if (!report.armable) {
     return description("fixed", title, sentence(report.reason ?? "no reason given"));
   }
+  if (status.frozen && isBlocked(status)) return inputBlocked();
   if (status.refusal) return description("free", title, sentence(status.refusal));
-  if (status.pressed && status.blocked) return inputBlocked();
+  if (isBlocked(status)) return inputBlocked();
   return status.early ? gettingReady() : null;
 }
 
@@ -306,6 +314,11 @@ function ofDoing(name, title, report, inputs) {
 
 function gettingReady() {
   return description("taking", "Preparing input", "");
+}
+
+/** @param {Status} status */
+function isBlocked({ pressed, frozen, blocked }) {
+  return (pressed || frozen) && blocked;
 }
 
 function inputBlocked() {
