@@ -178,3 +178,15 @@ def test_names_that_differ_only_in_case_or_unicode_form_are_equal():
     assert same_name("BOB") == same_name("bob ")
     assert same_name("é") == same_name("e\u0301")
     assert same_name("bob") != same_name("rob")
+
+
+def test_the_report_names_the_layers_that_are_off_at_first():
+    topics = {
+        **TOPICS,
+        "/map": "nav_msgs/OccupancyGrid",
+        "/move_base/local_costmap/costmap": "nav_msgs/OccupancyGrid",
+    }
+    lines = report("ws://bob:9090", discover(topics, "bob")).splitlines()
+    drawn = lines[lines.index("  drawn by webmap view:") + 1 :]
+    (off,) = (line.split()[0] for line in drawn if "; off under Layers" in line)
+    assert off == "/move_base/local_costmap/costmap"

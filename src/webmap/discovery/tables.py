@@ -36,6 +36,10 @@ OVERRULE = (
 )
 
 
+OFF = "; off under Layers at first where several robots have one"
+"""Follows the rule of a layer that the console may not show at first."""
+
+
 def report(url: str, findings: Findings) -> str:
     """Return all findings of a bridge, for people."""
     number = len(findings.robots)
@@ -92,10 +96,11 @@ def drawn_table(namespace: str, layers: Layers) -> list[str]:
         layers: The layers drawn and left out.
 
     """
-    rows = [
-        (layer.topic, drawing(layer, namespace, None).module, layer.rule)
-        for layer in layers.drawn
-    ]
+    rows = []
+    for layer in layers.drawn:
+        drawn = drawing(layer, namespace, None)
+        off = OFF if drawn.options.get("palette") == "costmap" else ""
+        rows.append((layer.topic, drawn.module, layer.rule + off))
     if not rows:
         return []
     widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
