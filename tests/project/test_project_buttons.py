@@ -1,32 +1,12 @@
 """The names of buttons that the documentation prints in bold are on the page."""
 
 import re
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from equipment.doc_buttons import PAGES, ROOT, bold
+
 PACKAGE = ROOT / "src" / "webmap"
-PAGES = sorted(
-    [*(ROOT / "docs").glob("manual*.md"), *(ROOT / "docs/howto").glob("*.md")]
-)
-
-NO_BUTTON = {
-    *("Ctrl+K", "LB", "left shoulder button", "left stick", "right stick"),
-    *("release it to stop", "speed limit"),
-}
-"""Bold words that are keys, or stress a part of a sentence."""
-
-
-def bold(page: Path) -> set[tuple[str, str]]:
-    """Return the topic of the section, and each bold text that names something."""
-    found, topic = set(), page.stem
-    for line in page.read_text("utf-8").splitlines():
-        if line.startswith("## ") and page.stem.startswith("manual"):
-            topic = line.removeprefix("## ").strip().casefold()
-        texts = re.findall(r"\*\*(.+?)\*\*", line)
-        found |= {(topic, text) for text in texts if not text.endswith((".", ":"))}
-    return {(topic, text) for topic, text in found if text not in NO_BUTTON}
 
 
 def labels(topic: str) -> str:
@@ -50,8 +30,31 @@ def labels(topic: str) -> str:
 def test_each_button_that_the_documentation_names_is_on_the_page(page):
     missing = []
     for topic, name in sorted(bold(page)):
-        # The whole text of an element or of a literal, and no name of a key.
-        label = rf'(?<!key [!=]== )(?<!case )["\'>]{re.escape(name)}(?:["\'<]| <select)'
-        if not re.search(label, labels(topic)):
+        if not is_label(name, labels(topic)):
             missing.append(f"{name} ({topic})")
     assert missing == []
+
+
+KEYS = {"Space", "Enter", "Esc"}
+
+
+def test_each_button_that_a_text_of_the_code_names_is_on_the_page():
+    """Texts of commands and of the page name buttons: *press Run stop test on ...*."""
+    code, missing = labels(""), []
+    for file in sorted(PACKAGE.rglob("*")):
+        if file.suffix not in (".py", ".js", ".html"):
+            continue
+        # A text may go on in the next literal, and the page has tags in it.
+        text = re.sub(r'"\s*\n\s*f?"|</?strong>', "", file.read_text("utf-8"))
+        for found in re.findall(r"\b[Pp]ress(?:ed)? ([A-Z][^.,;:\"\n]*)", text):
+            words = found.split()
+            names = [" ".join(words[:count]) for count in range(1, 7)]
+            if not KEYS & set(names) and not any(is_label(n, code) for n in names):
+                missing.append(f"{found} ({file.name})")
+    assert missing == []
+
+
+def is_label(name, code):
+    """Return whether a name is the text of an element or literal, and no key."""
+    pattern = rf'(?<!key [!=]== )(?<!case )["\'>]{re.escape(name)}(?:["\'<]| <select)'
+    return re.search(pattern, code) is not None

@@ -1,0 +1,41 @@
+"""The buttons that the documentation names are on the page in use, with that name."""
+
+import pytest
+from console_ready import select
+
+from equipment.doc_buttons import PAGES, bold
+
+pytestmark = [pytest.mark.browser]
+
+NAMES = """() => [...document.querySelectorAll("button, summary, label")].flatMap(
+  (button) => [button, ...button.querySelectorAll("*")].flatMap((part) => [
+    part.getAttribute("aria-label"), part.textContent, part.firstChild?.textContent,
+  ])).filter(Boolean).map((text) => text.trim())"""
+"""The names of all buttons, also of those whose panel is folded."""
+
+NOT_AT_REST = {
+    "Acknowledge": "of an alert",
+    "Hand over": "of a request for control",
+    "Keep control": "of a request for control",
+    "Move": "of a label",
+    "Name?": "of a page whose operator has no name yet",
+    "Pause": "of a route that runs",
+    "Release control": "of a robot that this page has",
+    "Request control": "of a robot that another operator has",
+    "Selected robot only": "of a map with several robots that have layers",
+    "Send goal here": "of a label",
+}
+"""Buttons that another state of the page shows: tests/project looks in the code."""
+
+STATES = {"STOP NOT CONFIRMED", "STOP active"}
+"""Bold texts of the manual that are states."""
+
+
+def test_each_button_that_the_documentation_names_is_on_the_page_in_use(open_console):
+    page = open_console()
+    select(page, "Robot 1")
+    named = {name for file in PAGES for _, name in bold(file)}
+    page.locator(".webmap-teleop-lease").wait_for()
+    missing = named - set(page.evaluate(NAMES)) - set(NOT_AT_REST) - STATES
+    assert missing == set()
+    assert set(NOT_AT_REST) <= named, "what the documentation names no more"
