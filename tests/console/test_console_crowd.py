@@ -276,6 +276,8 @@ def test_a_condition_is_beside_the_activity_in_its_own_colour(page):
             "(all) => all.map((each) => getComputedStyle(each).color)"
         )
         assert len(set(colours)) == 2
+    sheet = "Robot 4: Autonomous · battery low"
+    expect(page.locator("#sheet-text")).to_have_text(sheet)
     page.keyboard.press("Control+k")
     page.keyboard.type("robot 4")
     line = page.locator(".palette-line").first

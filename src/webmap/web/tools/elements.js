@@ -339,7 +339,7 @@ export function nameSheet(map) {
     const name = document.querySelector(`${row} .name`)?.textContent;
     const states = [...document.querySelectorAll(`${row} .state > *`)]
       .filter((one) => getComputedStyle(one).display !== "none")
-      .map((one) => one.textContent);
+      .map((one) => one.textContent?.replace(/^ \u00b7 /, ""));
     const count = byId("robots-count").textContent ?? "";
     setText(text, name ? `${name}: ${states.join(" \u00b7 ")}` : count);
   };
