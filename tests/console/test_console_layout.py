@@ -131,13 +131,12 @@ def test_a_layout_is_saved_reset_and_loaded_and_the_last_view_is_restored(
     # A new page opens without a list in the dock, so that its map is wider.
     page.locator(".webmap-layers").evaluate("e => { e.open = false; }")
     page.wait_for_timeout(300)
-    wide = [*left[:4], left[4] + 160, left[5]]
-    assert view_of(page) == pytest.approx(wide, abs=0.01)
+    assert view_of(page) == pytest.approx(left, abs=0.01)
     context, url = page.context, page.url
     page.close()
     again = context.new_page()
     again.goto(url)
-    expect_view(again, wide)
+    expect_view(again, left)
     expect(again.locator(".robot.selected")).to_have_count(0)
     other = context.new_page()
     other.goto(f"{url}?layout=found")

@@ -152,7 +152,7 @@ class RobotCard:
         shape, tone, _ = look_of(robot)
         self._shape.show(shape)
         you = self.map.page.viewer.operator
-        self._words.show(state, you.person)
+        self._words.show(robot, you.person)
         self.element.set("data-state", state.name)
         reasons = (report.other_writer, report.reason) if report is not None else ()
         reason = " ".join(sentence(each) for each in reasons if each)

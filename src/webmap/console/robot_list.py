@@ -6,11 +6,9 @@ from typing import TYPE_CHECKING, Any
 from webmap import html, svg
 from webmap.config.robot import BATTERY_LOW
 from webmap.console.robot_looks import GROUPS, LOOKS, battery_tone, needs_person
-from webmap.core.robot_state import beside
 
 if TYPE_CHECKING:
     from webmap import Element, Map, Robot
-    from webmap.core.robot_state import RobotState
 
 FULL = 18.0
 """Width of the charge in the battery symbol when the battery is full."""
@@ -162,7 +160,7 @@ class Row:
         # One fault of a bridge is one group, whatever else is lost.
         apart = address if now.name == "no_bridge" else ""
         self._shape.show(look.symbol)
-        self._words.show(now, self._person)
+        self._words.show(self.robot, self._person)
         self._battery.show(charge, robot.battery_low)
         for name, value in {
             "tone": look.tone,
@@ -211,15 +209,16 @@ class StateWords:
 
     def __init__(self, element: "Element") -> None:
         self.element = element.set("class", "state")
-        self._shown: RobotState | None = None
+        self._shown: object = None
         self._activity = html.span(class_="holder")
         self._own = html.span(class_="you")
         self._conditions = html.span()
         old = html.span(text="Stale data", class_="old")
         element.append(old, self._activity, self._own)
 
-    def show(self, state: "RobotState", person: str) -> None:
-        """Show a state of a robot on a page of a person."""
+    def show(self, robot: "Robot", person: str) -> None:
+        """Show the state of a robot on a page of a person."""
+        state = robot.state
         if state == self._shown:
             return  # a status that is written again may be read aloud again
         self._shown = state
@@ -228,7 +227,7 @@ class StateWords:
         self._own.set("data-tone", tone).text = state.own_text
         self._conditions.remove()
         if state.conditions:
-            self._conditions.text = beside("", state.conditions_text)
+            self._conditions.text = state.besides_text
             self._conditions.set("data-tone", LOOKS[state.conditions[0]].tone)
             self.element.append(self._conditions)
 

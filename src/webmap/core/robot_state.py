@@ -133,6 +133,11 @@ class RobotState(NamedTuple):
         """That text for the page that has control of the robot."""
         return beside(self.own_text, self.conditions_text)
 
+    @property
+    def besides_text(self) -> str:
+        """The text of the conditions, to follow that of the activity."""
+        return beside("", self.conditions_text)
+
     def activity_for(self, person: str) -> str:
         """Return the text of the activity for pages of a person without control."""
         return self.elsewhere_text if person == self.person else self.activity_text

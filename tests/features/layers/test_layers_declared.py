@@ -206,7 +206,7 @@ PRIVATE = {
     # Layers that draw more than one topic, or in several frames at once.
     "Diagnostics": {"draw_or_report", "Removal", "keep", "robot_modules"},
     "Markers": {"LayerFrames", "TransformError", "not_known", "Removal", "keep"},
-    "OccupancyGrid": {"MessageProblems", "spawn"},
+    "OccupancyGrid": {"MessageProblems", "cell_at", "spawn"},
     # Names that only these layers use.
     "LaserScanner": {"Rays", "scan_name"},
     "NavSatFix": {"LocalPlane"},
