@@ -85,6 +85,9 @@ class Tap:
         match message:
             case {"type": "connect", "connection": connection, "name": name}:
                 self.names.call(connection, f"<{name}>")
+                if identity := message.get("identity"):
+                    self.names.call(identity["person"], f"<person {name}>")
+                    self.names.call(identity["page"], f"<page {name}>")
             case {"type": "declare", "id": id, "name": name}:
                 self.names.call(id, f"<{name}>")
             case {"type": "gone", "robot": robot}:
