@@ -4,10 +4,13 @@ Usage: tools/screenshots.py [NAME ...]
 
 ``console-...`` shows the demo while a robot is driven, ``layers-...`` all layers of
 ``webmap view``, ``manual-...`` the steps of the operator's manual. Needs Chromium.
-Without names, it takes all pictures.
+Without names, it takes all pictures. ``manual`` takes those of the manual: take them
+again after a change of the bar, the driving panel or the list. The names of the buttons
+in ``manual-page``, ``manual-bar`` and ``manual-driving-bar`` come from the page.
 """
 
 import io
+import os
 import re
 import signal
 import subprocess
@@ -17,8 +20,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from shutil import which
+from tempfile import TemporaryDirectory
 from typing import Literal
 
+from callouts import box_of, copy_of, draw, parts_of, symbols
 from PIL import Image
 from playwright.sync_api import Browser, Page, sync_playwright
 
@@ -76,7 +81,15 @@ PICTURES = [
 def running(*arguments: str) -> Iterator[str]:
     """Run a command of WebMap and yield the address that it prints."""
     command = [sys.executable, "-m", "webmap", *arguments, "--port", "0"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    with (
+        TemporaryDirectory() as state,  # labels of this machine are in no picture
+        subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "WEBMAP_STATE_DIR": state},
+        ) as process,
+    ):
         assert process.stdout is not None
         try:
             found = re.search(r"ready at (\S+)", process.stdout.readline())
@@ -189,11 +202,6 @@ def select(page: Page, name: str) -> None:
     page.locator("#card h2", has_text=name).wait_for(state="attached")
 
 
-def show_driving(page: Page, browser: Browser, picture: Picture, url: str) -> None:
-    """Drive a robot."""
-    drive(page)
-
-
 def show_stop(page: Page, browser: Browser, picture: Picture, url: str) -> None:
     """Stop a robot that is driven, and wait until odometry confirms the STOP."""
     drive(page)
@@ -238,32 +246,84 @@ def show_phone(page: Page, browser: Browser, picture: Picture, url: str) -> None
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(x + 10, y - 40, steps=5)
-    page.locator('.webmap-teleop[data-state="driving"]').wait_for()
+    page.locator(DRIVEN).wait_for()
     page.wait_for_timeout(1000)
+
+
+def show_all_stopped(page: Page, browser: Browser, picture: Picture, url: str) -> None:
+    """Stop all robots, and wait until odometry confirms it."""
+    page.locator(".webmap-stop-all").click()
+    page.locator('.webmap-stop-verdict[data-state="confirmed"]').wait_for()
 
 
 ROBOT = "Robot 1"
 
+DRIVEN = '.webmap-teleop[data-state="driving"]'
+
 STEPS: dict[str, Callable[[Page, Browser, Picture, str], None]] = {
-    "select": lambda page, browser, picture, url: page.wait_for_timeout(1000),
-    "driving": show_driving,
+    "page": lambda page, browser, picture, url: page.wait_for_timeout(1000),
+    "bar": lambda page, browser, picture, url: page.wait_for_timeout(1000),
+    "legend": lambda page, browser, picture, url: None,
+    "symbols": lambda page, browser, picture, url: None,
+    "driving-bar": lambda page, browser, picture, url: drive(page),
     "stop": show_stop,
     "goal": show_goal,
     "request": show_request,
+    "thirty": show_all_stopped,
     "phone": show_phone,
 }
 """The actions for each picture of the operator's manual, after selecting ``ROBOT``."""
 
+BAR = "header.bar :is(button, summary, #link), #stop-place button"
+"""What the bar has: buttons, lists that unfold, and the state of the connection."""
+
+DRIVING_BAR = ".drive-bar :is(button, .webmap-teleop-words > p)"
+
+REGIONS = {
+    "header.bar": "The bar",
+    "#stop-place": "STOP and STOP ALL",
+    "#robots-part": "The list of robots",
+    "#card": "The card of the selected robot",
+    ".map-tools": "The buttons of the view",
+    "#map": "The map",
+    ".drive-bar": "The driving panel",
+}
+"""The parts of the page; they have no names on the page itself."""
+
 PICTURES += [Picture("manual", step=step, phone=step == "phone") for step in STEPS]
+
+
+def shoot_step(page: Page, step: str) -> Image.Image:
+    """Return the picture of a step, in three of them with the names of the parts."""
+    if step == "legend":
+        return copy_of(page, "#legend")
+    if step == "symbols":
+        return symbols(page)
+    box, parts = box_of(page, "body"), []
+    if step == "page":
+        parts = [box_of(page, part, name) for part, name in REGIONS.items()]
+    elif step == "bar":
+        box, parts = box_of(page, "header.bar, #stop-place"), parts_of(page, BAR)
+    elif step == "driving-bar":
+        box, parts = box_of(page, ".drive-bar"), parts_of(page, DRIVING_BAR)
+    shot = page.screenshot()
+    slow = any("slow connection" in part.name for part in parts)
+    if step == "driving-bar" and (slow or not page.locator(DRIVEN).count()):
+        drive(page)  # a busy machine limits or ends the driving
+        return shoot_step(page, step)
+    if parts:
+        return draw(page, shot, parts, box)
+    return Image.open(io.BytesIO(shot)).convert("RGB")
 
 
 def take_manual(browser: Browser, picture: Picture, url: str) -> None:
     """Take one picture of the manual, with 256 colours so that its file is small."""
-    with demo("--robots", "3", "--quiet") as own:
+    robots = "30" if picture.step == "thirty" else "3"
+    with demo("--robots", robots, "--quiet") as own:
         page = open_page(browser, picture, own)
         select(page, ROBOT)
         STEPS[picture.step](page, browser, picture, own)
-        shot = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+        shot = shoot_step(page, picture.step)
         for context in browser.contexts:
             context.close()
     few = shot.quantize(
@@ -274,25 +334,29 @@ def take_manual(browser: Browser, picture: Picture, url: str) -> None:
 
 def drive(page: Page) -> None:
     """Hold a key until the robot moves; the previous page may still have control."""
-    driving = page.locator('.webmap-teleop[data-state="driving"]')
+    driving = page.locator(DRIVEN)
     for _ in range(10):
+        page.keyboard.up("w")
+        page.wait_for_timeout(500)
         page.keyboard.down("w")
         page.wait_for_timeout(1500)
         if driving.count():
             return
-        page.keyboard.up("w")
-        page.wait_for_timeout(500)
     status = page.locator(".webmap-teleop-state").inner_text()
     raise SystemExit(f"the robot could not be driven: {status}")
 
 
 def main(names: list[str]) -> None:
     """Take the pictures of these names, or all."""
-    unknown = set(names) - {picture.name for picture in PICTURES}
+    unknown = set(names) - {picture.name for picture in PICTURES} - {"manual", *SCENES}
     if unknown:
         raise SystemExit(f"there is no picture {', '.join(sorted(unknown))}")
     FOLDER.mkdir(parents=True, exist_ok=True)
-    wanted = [picture for picture in PICTURES if not names or picture.name in names]
+    wanted = [
+        picture
+        for picture in PICTURES
+        if not names or {picture.name, picture.scene} & set(names)
+    ]
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(
             executable_path=which("chromium"), args=ARGS
