@@ -22,6 +22,19 @@ def wait_until_ready(page: Page) -> None:
         page.wait_for_timeout(50)
 
 
+def count_presses(page: Page) -> None:
+    """Count the presses from now on."""
+    page.evaluate("""() => {
+      window.presses = 0;
+      addEventListener("pointerdown", () => { window.presses += 1; }, true);
+    }""")
+
+
+def presses(page: Page) -> int:
+    """Return the number of presses since the last call."""
+    return page.evaluate("() => { const n = presses; window.presses = 0; return n; }")
+
+
 BESIDE = 30
 """Pixels beside a robot, to the right and down."""
 

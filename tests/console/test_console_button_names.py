@@ -1,9 +1,15 @@
 """The buttons that the documentation names are on the page in use, with that name."""
 
+import sys
+
 import pytest
 from console_ready import select
 
-from equipment.doc_buttons import PAGES, bold
+from equipment.doc_buttons import DOCS, PAGES, ROOT, bold, rows_below
+
+sys.path.append(str(ROOT / "tools"))
+from callouts import parts_of
+from screenshots import BAR
 
 pytestmark = [pytest.mark.browser]
 
@@ -22,6 +28,7 @@ NOT_AT_REST = {
     "Pause": "of a route that runs",
     "Release control": "of a robot that this page has",
     "Request control": "of a robot that another operator has",
+    "Reset all": "of a STOP of several robots",
     "Selected robot only": "of a map with several robots that have layers",
     "Send goal here": "of a label",
 }
@@ -39,3 +46,16 @@ def test_each_button_that_the_documentation_names_is_on_the_page_in_use(open_con
     missing = named - set(page.evaluate(NAMES)) - set(NOT_AT_REST) - STATES
     assert missing == set()
     assert set(NOT_AT_REST) <= named, "what the documentation names no more"
+
+
+def test_the_manual_lists_each_button_of_the_bar_by_its_name_and_number(open_console):
+    page = open_console()
+    select(page, "Robot 1")
+    page.set_viewport_size({"width": 1440, "height": 900})  # as in the picture
+    page.locator('.webmap-teleop-stop[data-robot="Robot 1"]').wait_for()
+    page.locator("#link[data-link=open]").wait_for()
+    rows = rows_below(DOCS / "manual" / "first-ten-minutes.md", "(the-bar)=")
+    names = [part.name for part in parts_of(page, BAR)]
+    assert [row[:2] for row in rows] == [
+        [str(number), name] for number, name in enumerate(names, 1)
+    ]

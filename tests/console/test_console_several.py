@@ -4,7 +4,10 @@ import re
 from contextlib import suppress
 
 import pytest
+from console_ready import count_presses, presses
 from playwright.sync_api import Page, expect
+
+from equipment.doc_buttons import PRESSES
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -102,6 +105,7 @@ def test_all_robots_of_a_search_are_sent_and_their_goals_cancelled(demo, open_co
 def test_each_press_sends_the_next_of_several_robots(demo, open_console):
     page = open_console()
     page.locator("#show-all").click()
+    count_presses(page)
     draw_box(page)
     page.locator(".webmap-several").get_by_role("button", name="Send goal…").click()
     box = page.locator("svg.webmap").bounding_box()
@@ -120,5 +124,7 @@ def test_each_press_sends_the_next_of_several_robots(demo, open_console):
         expect(page.locator(".webmap-goal-arrow.aimed")).to_have_count(1)
         page.mouse.up()
     assert robots == [], "each robot was placed once"
+    more = PRESSES["Send five robots to five places"] - 5
+    assert presses(page) == demo.robots + more
     expect(page.locator(".webmap-goal-go")).to_have_attribute("aria-pressed", "false")
     expect(page.locator(".webmap-ground-word")).to_be_hidden()
