@@ -96,7 +96,7 @@ COPY = """([selector, width]) => {
   holder.id = "copy";
   const copy = document.querySelector(selector).cloneNode(true);
   copy.open = true;
-  copy.querySelector("summary").remove();
+  copy.querySelector("summary").style.display = "none";
   holder.append(copy);
   holder.style.cssText = `position: absolute; z-index: 99; inset: 0 auto auto 0;
     width: ${width}px; padding: 12px 0; background: var(--webmap-surface)`;

@@ -9,7 +9,7 @@ from equipment.doc_buttons import DOCS, PAGES, ROOT, bold, rows_below
 
 sys.path.append(str(ROOT / "tools"))
 from callouts import parts_of
-from screenshots import BAR
+from screenshots import BAR, REGIONS
 
 pytestmark = [pytest.mark.browser]
 
@@ -48,14 +48,24 @@ def test_each_button_that_the_documentation_names_is_on_the_page_in_use(open_con
     assert set(NOT_AT_REST) <= named, "what the documentation names no more"
 
 
-def test_the_manual_lists_each_button_of_the_bar_by_its_name_and_number(open_console):
+FIRST = DOCS / "manual" / "first-ten-minutes.md"
+
+
+def numbered(line: str) -> list[tuple[int, str]]:
+    """Return the numbers and names of the table after a line of the first page."""
+    return [(int(row[0]), row[1]) for row in rows_below(FIRST, line)]
+
+
+def test_the_manual_numbers_the_parts_of_the_page_as_its_picture_does():
+    names = [name.replace("The ", "the ") for name in REGIONS.values()]
+    assert numbered("## 3. Know the parts of the page") == [*enumerate(names, 1)]
+
+
+def test_the_manual_numbers_the_buttons_of_the_bar_as_its_picture_does(open_console):
     page = open_console()
     select(page, "Robot 1")
     page.set_viewport_size({"width": 1440, "height": 900})  # as in the picture
     page.locator('.webmap-teleop-stop[data-robot="Robot 1"]').wait_for()
     page.locator("#link[data-link=open]").wait_for()
-    rows = rows_below(DOCS / "manual" / "first-ten-minutes.md", "(the-bar)=")
     names = [part.name for part in parts_of(page, BAR)]
-    assert [row[:2] for row in rows] == [
-        [str(number), name] for number, name in enumerate(names, 1)
-    ]
+    assert numbered("(the-bar)=") == [*enumerate(names, 1)]
