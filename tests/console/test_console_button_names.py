@@ -29,7 +29,8 @@ NOT_AT_REST = {
     "Release control": "of a robot that this page has",
     "Request control": "of a robot that another operator has",
     "Reset all": "of a STOP of several robots",
-    "Selected robot only": "of a map with several robots that have layers",
+    "Selected robot": "of a map with several robots that have layers",
+    "All robots": "of a map with several robots that have layers",
     "Send goal here": "of a label",
 }
 """Buttons that another state of the page shows: tests/project looks in the code."""

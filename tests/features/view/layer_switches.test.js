@@ -28,7 +28,7 @@ test("one topic of a layer can be hidden alone", () => {
 test("the layers of other robots are hidden, their health is not", () => {
   const layers = [...LAYERS, ["Health", ".diagnostics"]];
   assert.equal(
-    hidingRules(layers, { "Selected robot only": true }, "[a]", "r1").replaceAll(
+    hidingRules(layers, { "Selected robot": true }, "[a]", "r1").replaceAll(
       ".laserscan,.floor, .map-file",
       "ALL",
     ),

@@ -106,7 +106,7 @@ def test_layers_are_grouped_by_robot_and_only_those_of_the_selected_one_are_left
         page.get_by_role("checkbox", name="Costmaps").check()
         expect(costmaps).to_have_count(2)
 
-        page.get_by_role("checkbox", name="Selected robot only").check()
+        page.get_by_role("radio", name="Selected robot").check()
         expect(scans).to_have_count(0)
         page.locator("[data-name='Robot 10']").dispatch_event("click")
         expect(page.locator(".robot.selected")).to_have_count(1)

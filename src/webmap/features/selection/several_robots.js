@@ -87,15 +87,13 @@ class SeveralBar {
       send({ mark: robots.filter((robot) => robot !== null) });
     };
     ownPlace(own)?.addEventListener("click", act, { signal: this._ending.signal });
-    this._off = onBeat(() => this._show());
-    this._off = map.onSelect(() => this.showProblem(""));
+    this._offs = [onBeat(() => this._show()), map.onSelect(() => this.showProblem(""))];
     this._show();
   }
 
   destroy() {
-    this._off();
+    for (const off of this._offs) off();
     this._ending.abort();
-    this._off();
     this._take();
   }
 

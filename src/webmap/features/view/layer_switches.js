@@ -18,7 +18,7 @@ const MOST = 16;
 const PERIOD = 4;
 
 /** The choice to show only the layers of the selected robot. */
-const ONLY = "Selected robot only";
+const ONLY = "Selected robot";
 
 /** A badge of health is no drawing: it is shown for each robot. */
 const BADGES = "Health";
@@ -220,8 +220,35 @@ class LayerSwitches {
   /** @param {string} key A layer, or one of its drawings. */
   _add(key) {
     const [name, one = ""] = key.split(OF);
-    this._rows.set(key, this._switch(key, one || name));
+    this._rows.set(key, key === ONLY ? this._whose() : this._switch(key, one || name));
     this._arrange();
+  }
+
+  /** Make the choice between the layers of all robots and those of the selected one. */
+  _whose() {
+    const choices = ["All robots", ONLY].map((text) => {
+      const value = text === ONLY ? "on" : "off";
+      const name = `webmap-layers-${this._number}`;
+      const box = this._box(ONLY, { type: "radio", name, value });
+      return html("label", "webmap-layers-row", {}, box, text);
+    });
+    const names = { role: "radiogroup", "aria-label": "Whose layers are shown" };
+    return html("div", "webmap-layers-whose", names, ...choices);
+  }
+
+  /**
+   * @param {string} key A layer, one of its drawings, or the choice of robots.
+   * @param {Record<string, string>} attributes
+   */
+  _box(key, attributes) {
+    const box = html("input", "", { ...attributes, "data-key": key });
+    box.checked = this._isOn(key) === (box.value === "on");
+    box.addEventListener("change", () => {
+      this._shown[key] = box.checked === (box.value === "on");
+      storeChoice(this._shown);
+      this._apply();
+    });
+    return box;
   }
 
   /**
@@ -230,13 +257,7 @@ class LayerSwitches {
    */
   _switch(key, text) {
     const [name, one = ""] = key.split(OF);
-    const box = html("input", "", { type: "checkbox", "data-key": key });
-    box.checked = this._isOn(key);
-    box.addEventListener("change", () => {
-      this._shown[key] = box.checked;
-      storeChoice(this._shown);
-      this._apply();
-    });
+    const box = this._box(key, { type: "checkbox" });
     const kind = one ? "webmap-layers-row one" : "webmap-layers-row";
     const row = html("label", kind, {}, box, html("span", "", { dir: "auto" }, text));
     if (one) row.title = `${name}: ${one}`;
@@ -257,7 +278,9 @@ class LayerSwitches {
   _check() {
     /** @type {NodeListOf<HTMLInputElement>} */
     const boxes = this._details.querySelectorAll("[data-key]");
-    for (const box of boxes) box.checked = this._isOn(box.dataset.key ?? "");
+    for (const box of boxes) {
+      box.checked = this._isOn(box.dataset.key ?? "") === (box.value === "on");
+    }
   }
 
   /**
