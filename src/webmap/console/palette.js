@@ -25,6 +25,7 @@ const BUTTONS = /** @type {const} */ ([
   ["Selected robot", "#card [data-act=follow]", ""],
   ["Selected robots", ".webmap-several > button:not(.webmap-stop-button)", ""],
   ["Camera", "#card [data-camera-id]", ".camera-title"],
+  ["Camera", ".camera-panel :is(.camera-wall, .camera-full)", ""],
   ["Control", ".webmap-teleop-acts button", ""],
   ["Tool", ".tools .webmap-tool-go", ".webmap-tool-name"],
   ["Layer", ".webmap-layers-row", "span"],
@@ -232,7 +233,8 @@ function isOff(element) {
 function usable(element) {
   if (element instanceof HTMLButtonElement && element.disabled) return false;
   if (isOff(element)) return false;
-  return element.closest("[hidden]:not(.webmap-export-menu)") === null;
+  // Some buttons open what they are in.
+  return element.closest("[hidden]:not(.webmap-export-menu, .camera-panel)") === null;
 }
 
 /** @param {Element} element */

@@ -1,32 +1,39 @@
 import {
+  cameraAt,
   CameraView,
   DEFAULTS,
   listenToDrags,
+  MOST,
+  nextCamera,
   nextCorner,
+  placeOf,
   readState,
   roomFor,
   storeState,
 } from "./camera_view.js";
 import { resolve } from "../../web/access.js";
+import { devicesOf } from "../../web/inputs/devices.js";
 import { closeSheet } from "../../web/tools/elements.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('./camera_view.js').Dock} Dock */
 
 /** @typedef {{dock: Dock, x: number, y: number}} Place */
-/** @typedef {{id: number, name: string}} Camera */
-/** @typedef {{op: 'cameras', robot: string, name: string, cameras: Camera[]}} Cameras */
+/** @typedef {import('./camera_cell.js').Camera} Camera */
+/** @typedef {import('./camera_cell.js').CameraCell} CameraCell */
+/** @typedef {import('./camera_cell.js').RobotCameras} RobotCameras */
+/** @typedef {import('./camera_cell.js').Target} Target */
+/** @typedef {{op: 'cameras'} & RobotCameras} Cameras Of the selected robot. */
+/** @typedef {{op: 'robots', robots: RobotCameras[]}} Robots For the wall. */
 /** @typedef {{op: 'picture', camera: number, url: string, stamp: number}} Picture */
 
 /** Milliseconds between two updates of the age. */
 const PERIOD = 100;
 
-/** Milliseconds after which a picture is stale; the gate also stops at this age. */
-const OLD = 1000;
-
 /**
- * One camera of the selected robot, large. An operator who drives the robot while the
- * panel is open relies on it: when its picture is stale the robot stops.
+ * One camera of the selected robot, large, or a wall of cameras of several robots. An
+ * operator who drives a robot while its camera is shown here relies on it: when its
+ * picture is stale the robot stops. Of several cameras of a robot the oldest counts.
  *
  * @param {MapCanvas} map
  * @param {object} _options
@@ -35,7 +42,7 @@ const OLD = 1000;
 export default function attach(map, _options, send) {
   const panel = new CameraPanel(map, send);
   return {
-    receive: (/** @type {Cameras | Picture} */ message) => panel.receive(message),
+    receive: (/** @type {Cameras | Robots | Picture} */ message) => panel.receive(message),
     destroy: () => panel.destroy(),
   };
 }
@@ -53,23 +60,36 @@ class CameraPanel {
     this._there = { op: "cameras", robot: "", name: "", cameras: [] };
     /** @type {Camera | null} */
     this._camera = null;
-    /** @type {number | null} The camera that the display was asked for. */
-    this._watched = null;
+    /** @type {RobotCameras[]} All robots with cameras, while there is a wall. */
+    this._robots = [];
+    /** Whether a new wall waits for its first cameras. */
+    this._fresh = false;
+    /** Whether the panel fills the window, below the bar with STOP. */
+    this._full = false;
+    /** What the display was asked for. */
+    this._asked = "";
     this._goesBy = () => {};
     this._view = new CameraView({
       choose: (id) => this.choose(id),
       dock: (dock) => this._dock(dock),
+      wall: () => this._turnWall(),
+      full: () => this._turnFull(),
       close: () => this._close(),
+      add: () => this._add(nextCamera(this._robots, this._targets, this._there.robot)),
+      seen: () => this._rely(),
+      select: (robot) => this._send({ op: "select", robot }),
+      put: (cell, id) => this._put(this._view.cells.indexOf(cell), placeOf(this._robots, id)),
+      remove: (cell) => this._remove(cell),
     });
-    this._picture = new NewestPicture(loadImage, (image) => this._view.show(image));
     this._ending = new AbortController();
     const { signal } = this._ending;
     document.addEventListener("visibilitychange", () => this._watch(), { signal });
     document.addEventListener("click", (event) => this._clicked(event), { signal });
     window.addEventListener("resize", () => this._place(), { signal });
+    listenToFullScreen(map.drive, () => this._full, () => this._setFull(false), signal);
     listenToDrags(
       this._view.head,
-      () => this._kept.dock === "float",
+      () => this._kept.dock === "float" && !this._full,
       () => roomFor(this._view.element, map.svg),
       () => this._view.element.getBoundingClientRect(),
       (x, y) => this._float(x, y),
@@ -83,26 +103,32 @@ class CameraPanel {
       write: (place) => this._move(place),
       reset: () => this._move(DEFAULTS),
     });
+    this._offEscape = devicesOf(map.drive).claimEscape(() => this._setFull(false));
     this._show();
   }
 
   destroy() {
     this._ending.abort();
     this._leave();
+    this._offEscape();
+    this._setFull(false);
     clearInterval(this._timer);
     this._goesBy();
-    this._view.element.remove();
+    this._view.destroy();
     delete document.body.dataset.camera;
   }
 
-  /** @param {Cameras | Picture} message */
+  /** @param {Cameras | Robots | Picture} message */
   receive(message) {
     if (message.op === "cameras") this._take(message);
-    else if (message.camera === this._camera?.id) {
+    else if (message.op === "robots") this._takeAll(message.robots);
+    else {
       const { clock } = this._map;
       const age = clock === null ? 0 : 1000 * (clock - message.stamp);
       const url = resolve(message.url, document.baseURI);
-      if (url !== null) this._picture.offer(url, age);
+      for (const { target, picture } of this._view.cells) {
+        if (url !== null && target.camera?.id === message.camera) picture.offer(url, age);
+      }
     }
   }
 
@@ -111,11 +137,25 @@ class CameraPanel {
     const same = there.robot === this._there.robot;
     this._there = there;
     // Request again, as a reconnected page must: the display sends the current state.
-    this._watched = null;
+    this._asked = "";
     const { cameras } = there;
     const chosen = same && cameras.find(({ id }) => id === this._camera?.id);
     const named = cameras.find(({ name }) => name === this._kept.camera);
-    this._use(chosen || named || cameras.at(0) || null);
+    this._camera = chosen || named || cameras.at(0) || null;
+    this._show();
+  }
+
+  /** @param {RobotCameras[]} robots */
+  _takeAll(robots) {
+    this._robots = robots;
+    while (this._fresh && this._kept.cells.length < 2) {
+      const next = nextCamera(robots, this._targets, this._there.robot);
+      if (next === null) break;
+      this._kept.cells.push(next);
+    }
+    this._fresh = false;
+    this._asked = "";
+    this._change({});
   }
 
   /**
@@ -126,30 +166,89 @@ class CameraPanel {
   choose(id) {
     const camera = this._there.cameras.find((one) => one.id === id);
     if (!camera) return;
-    Object.assign(this._kept, { open: true, camera: camera.name });
-    storeState(this._kept);
-    this._use(camera);
+    this._camera = camera;
+    this._change({ open: true, camera: camera.name });
   }
 
-  /** @param {Camera | null} camera */
-  _use(camera) {
-    if (camera?.id !== this._camera?.id) {
-      this._picture.restart();
-      this._view.clear();
-    }
-    this._camera = camera;
+  /**
+   * Change what the browser stores, and show it.
+   *
+   * @param {Partial<import('./camera_view.js').PanelState>} changes
+   */
+  _change(changes) {
+    Object.assign(this._kept, changes);
+    storeState(this._kept);
     this._show();
   }
 
   get _open() {
-    return this._kept.open && this._camera !== null;
+    return this._kept.open && (this._kept.wall || this._camera !== null);
+  }
+
+  /** @returns {Target[]} What the cells show. */
+  get _targets() {
+    if (!this._open) return [];
+    if (this._kept.wall) return this._kept.cells.map((place) => cameraAt(this._robots, place));
+    const { robot, name } = this._there;
+    return [{ robot, name, label: this._camera?.name ?? "", camera: this._camera }];
   }
 
   _close() {
-    this._kept.open = false;
-    storeState(this._kept);
-    this._show();
+    this._setFull(false);
+    this._change({ open: false });
     cardButton(this._camera?.id)?.focus();
+  }
+
+  _turnWall() {
+    const wall = !(this._open && this._kept.wall);
+    this._fresh = wall && this._kept.cells.length === 0;
+    if (!wall && this._camera === null) this._close();
+    this._change({ wall, ...(wall && { open: true }) });
+  }
+
+  /** @param {import('./camera_view.js').Place | null} place */
+  _add(place) {
+    if (place) this._change({ cells: [...this._kept.cells, place].slice(0, MOST) });
+  }
+
+  /**
+   * @param {number} index
+   * @param {import('./camera_view.js').Place | null} place
+   */
+  _put(index, place) {
+    if (place === null) return;
+    const cells = this._kept.cells.map((one, at) => (at === index ? place : one));
+    this._change({ cells });
+  }
+
+  /** @param {CameraCell} cell */
+  _remove(cell) {
+    const index = this._view.cells.indexOf(cell);
+    this._view.drop(cell);
+    this._change({ cells: this._kept.cells.filter((_, at) => at !== index) });
+  }
+
+  _turnFull() {
+    // Without a selected robot there are only the cameras of the wall.
+    if (!this._open && this._camera === null) this._turnWall();
+    this._kept.open = true;
+    this._setFull(!this._full);
+  }
+
+  /**
+   * Let the panel fill the window below the bar, where STOP stays, and the window fill
+   * the screen.
+   *
+   * @param {boolean} full
+   * @returns {boolean} Whether that is a change.
+   */
+  _setFull(full) {
+    if (full === this._full) return false;
+    this._full = full;
+    this._change({});
+    if (full) void fillScreen();
+    else if (document.fullscreenElement) void document.exitFullscreen();
+    return true;
   }
 
   /** @param {Dock} dock */
@@ -157,16 +256,15 @@ class CameraPanel {
     const { dock: before, x, y } = this._kept;
     if (dock === "float" && before === "float") {
       // Without a pointer the panel moves from corner to corner.
-      Object.assign(this._kept, nextCorner(x, y));
+      if (!this._full) Object.assign(this._kept, nextCorner(x, y));
     }
+    this._setFull(false);
     this._move({ ...this._kept, dock });
   }
 
   /** @param {Place} place */
   _move({ dock, x, y }) {
-    Object.assign(this._kept, { dock, x, y });
-    storeState(this._kept);
-    this._show();
+    this._change({ dock, x, y });
   }
 
   /**
@@ -185,58 +283,74 @@ class CameraPanel {
     const button = target.closest("[data-camera-id]");
     if (!(button instanceof HTMLElement)) return;
     const id = Number(button.dataset.cameraId);
-    if (this._open && this._camera?.id === id) this._close();
+    const cell = this._view.cells.find((one) => one.target.camera?.id === id);
+    if (this._open && this._kept.wall) {
+      if (cell) this._remove(cell);
+      else if (this._kept.cells.length < MOST) this._add(placeOf([this._there], id));
+      else this._put(MOST - 1, placeOf([this._there], id));
+    } else if (cell) this._close();
     else this.choose(id);
     closeSheet();
   }
 
   _show() {
     const open = this._open;
-    const { dock } = this._kept;
+    const { wall, dock: kept } = this._kept;
+    const dock = this._full ? "full" : kept;
     const { element } = this._view;
-    // The waiting time while the panel was closed does not count.
-    if (open && element.hidden) this._picture.restart();
     if (open) document.body.dataset.camera = dock;
     else delete document.body.dataset.camera;
-    this._view.open(open, dock, this._there, this._camera);
-    // A floating panel is over the map, but below the panels for driving and STOP.
-    const before = dock === "float" ? this._map.svg : this._map.svg.parentElement;
+    document.body.toggleAttribute("data-camera-wall", open && wall);
+    this._view.open(this._targets, open, dock, this._there.cameras, wall ? this._robots : null);
+    // Over the map, but below the panels for driving and STOP.
+    const over = dock === "float" || dock === "full";
+    const before = over ? this._map.svg : this._map.svg.parentElement;
     if (before?.nextElementSibling !== element) before?.after(element);
-    this._goesBy();
-    const { robot } = this._there;
-    const age = () => this._picture.age;
-    this._goesBy = open ? this._map.drive.goBy(robot, age) : () => {};
-    this._watch();
+    this._rely();
     this._place();
     this._look();
+  }
+
+  /** Note that the operator relies on the pictures in view, and request these. */
+  _rely() {
+    this._goesBy();
+    const counting = this._view.cells.filter(({ counts }) => counts);
+    const offs = [...new Set(counting.map(({ target }) => target.robot))].map((robot) => {
+      const own = counting.filter(({ target }) => target.robot === robot);
+      const age = () => Math.max(...own.map(({ picture }) => picture.age));
+      return this._map.drive.goBy(robot, age);
+    });
+    this._goesBy = () => offs.forEach((off) => off());
+    this._watch();
   }
 
   /** Request pictures while the panel is visible. */
   _watch() {
     const seen = this._open && document.visibilityState === "visible";
-    const wanted = seen ? (this._camera?.id ?? null) : null;
-    if (wanted === this._watched) return;
-    this._watched = wanted;
-    this._send({ op: "watch", camera: wanted });
+    const counting = seen ? this._view.cells.filter(({ counts }) => counts) : [];
+    const cameras = counting.map(({ target }) => target.camera?.id);
+    const message = { op: "watch", cameras, wall: this._open && this._kept.wall };
+    const asked = JSON.stringify(message);
+    if (asked === this._asked) return;
+    this._asked = asked;
+    this._send(message);
   }
 
   _look() {
+    const shown = this._view.cells.map(({ target }) => target.camera?.id);
     for (const button of document.querySelectorAll("button[data-camera-id]")) {
-      const id = Number(button.getAttribute("data-camera-id"));
-      const large = this._open && id === this._camera?.id;
+      const large = shown.includes(Number(button.getAttribute("data-camera-id")));
       if (button.getAttribute("aria-pressed") !== String(large)) {
         button.setAttribute("aria-pressed", String(large));
       }
     }
-    if (!this._open) return;
-    const { age, shown } = this._picture;
-    const mine = this._map.drive.robots.get(this._there.robot)?.mine === true;
-    this._view.showAge(age, shown, age > OLD, mine);
+    const { robots } = this._map.drive;
+    this._view.look(this._there.robot, (robot) => robots.get(robot)?.mine === true);
   }
 
   _place() {
     const { style } = this._view.element;
-    if (!this._open || this._kept.dock !== "float") {
+    if (!this._open || this._full || this._kept.dock !== "float") {
       style.removeProperty("left");
       style.removeProperty("top");
       return;
@@ -248,105 +362,44 @@ class CameraPanel {
   }
 }
 
-/**
- * @param {string} url
- * @returns {Promise<HTMLImageElement>}
- */
-async function loadImage(url) {
-  const image = new Image();
-  image.src = url;
-  await image.decode();
-  return image;
-}
-
 /** @param {number | undefined} id */
 function cardButton(id) {
   const button = document.querySelector(`[data-camera-id="${id}"]`);
   return button instanceof HTMLElement ? button : null;
 }
 
-/** Milliseconds after which an unfinished load no longer blocks the next. */
-const PATIENCE = 2000;
+/** Fill the screen. The browser may refuse that: the panel fills the window anyway. */
+async function fillScreen() {
+  const { keyboard } = /** @type {any} */ (navigator);
+  try {
+    await document.documentElement.requestFullscreen();
+    // Escape is STOP, so the page needs it; some browsers leave it to the page.
+    await keyboard?.lock(["Escape"]);
+  } catch {
+    // Not allowed, or not available: Escape then comes as the end of the full screen.
+  }
+}
 
 /**
- * The newest picture of one camera. One picture is loaded at a time; of the pictures
- * that arrive meanwhile only the newest is loaded. The age of the shown picture is
- * known.
+ * Treat the end of the full screen like Escape, which the browser may have used for it
+ * and not passed on: a driven robot stops, otherwise the panel is small again.
  *
- * Times are in milliseconds of the page's own clock.
- *
- * @template T
+ * @param {import('../../web/drive.js').Drive} drive
+ * @param {() => boolean} full Whether the panel fills the window.
+ * @param {() => void} leave
+ * @param {AbortSignal} signal
  */
-export class NewestPicture {
-  /**
-   * @param {(url: string) => Promise<T>} load Loads a whole picture.
-   * @param {(picture: T) => void} show
-   * @param {() => number} now
-   */
-  constructor(load, show, now = () => performance.now()) {
-    this._load = load;
-    this._show = show;
-    this._now = now;
-    this._since = now();
-    /** @type {number | null} Time when the shown picture was taken. */
-    this._taken = null;
-    /** @type {{url: string, taken: number} | null} */
-    this._next = null;
-    /** Identifies the current load; results of earlier loads are ignored. */
-    this._number = 0;
-    this._busySince = -Infinity;
-  }
-
-  /** Begin again without a picture, for another camera. */
-  restart() {
-    this._number++;
-    this._busySince = -Infinity;
-    this._next = null;
-    this._taken = null;
-    this._since = this._now();
-  }
-
-  /** Whether a picture is shown. */
-  get shown() {
-    return this._taken !== null;
-  }
-
-  /** Age of the shown picture; without a picture, the waiting time. */
-  get age() {
-    return Math.max(0, this._now() - (this._taken ?? this._since));
-  }
-
-  /**
-   * Offer a new picture.
-   *
-   * @param {string} url
-   * @param {number} age Its age already.
-   */
-  offer(url, age) {
-    this._next = { url, taken: this._now() - Math.max(0, age) };
-    if (this._now() - this._busySince >= PATIENCE) this._begin();
-  }
-
-  _begin() {
-    const next = this._next;
-    if (next === null) return;
-    this._next = null;
-    this._busySince = this._now();
-    const number = ++this._number;
-    this._load(next.url)
-      .then(
-        (picture) => {
-          if (number !== this._number) return;
-          this._taken = next.taken;
-          this._show(picture);
-        },
-        // The display replaced it by a newer picture, which is on its way.
-        () => {},
-      )
-      .finally(() => {
-        if (number !== this._number) return;
-        this._busySince = -Infinity;
-        this._begin();
-      });
-  }
+function listenToFullScreen(drive, full, leave, signal) {
+  let shift = false;
+  const key = (/** @type {KeyboardEvent} */ { shiftKey }) => (shift = shiftKey);
+  document.addEventListener("keydown", key, { signal, capture: true });
+  document.addEventListener("keyup", key, { signal, capture: true });
+  const changed = () => {
+    if (document.fullscreenElement || !full()) return;
+    const { driven, taking, choice } = drive.status;
+    if (shift) drive.stop("*");
+    else if (driven !== null || taking) drive.stop(driven ?? choice ?? "*");
+    else leave();
+  };
+  document.addEventListener("fullscreenchange", changed, { signal });
 }

@@ -1,9 +1,10 @@
-"""Pictures of a robot's cameras: all of them on its card, one of them large."""
+"""Pictures of cameras: those of a robot on its card, one or several of them large."""
 
 import itertools
 import math
 import time
 import weakref
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from webmap import html
@@ -82,19 +83,23 @@ class CameraPicture:
             self._age.set_age(0.0)
 
 
-class CameraPanel:
-    """Sends a page the pictures of the camera that it has chosen; a module of maps.
+MOST_WATCHED = 4
+"""Cameras that a page shows large at the same time."""
 
-    The page chooses the camera and the position of the panel, and stores both.
+
+class CameraPanel:
+    """Sends a page the pictures of the cameras that it shows large; a module of maps.
+
+    The page chooses the camera of the selected robot, or a wall of cameras of several
+    robots, and the position of the panel, and stores all of it.
     """
 
     def __init__(self, map: "Map") -> None:
         self.map = map
-        self._robot: Robot | None = None
+        self._wall = False
         self._cameras: dict[int, Any] = {}
-        self._sent: dict[str, Any] | None = None
-        self._watched: Any = None
-        self._watching: Any = None
+        self._sent: dict[str, Any] = {}
+        self._watching: dict[Any, Any] = {}
         self.browser_part = map.add_browser_part(
             self,
             "features/cameras/camera_panel.js",
@@ -104,12 +109,13 @@ class CameraPanel:
 
     def destroy(self) -> None:
         """Stop the pictures."""
-        self._watch(None)
+        self._watch([])
 
     def on_ready(self) -> None:
         """Send the cameras to a page that has connected or reconnected."""
-        self._watch(None)
-        self._sent = None
+        self._watch([])
+        self._wall = False
+        self._sent = {}
         self.poll()
 
     def on_select(self) -> None:
@@ -118,42 +124,51 @@ class CameraPanel:
 
     def poll(self) -> None:
         """Send the page the cameras that were added or removed."""
-        robot = self.map.selected
-        cameras = cameras_of(robot)
-        message = {
-            "op": "cameras",
-            "robot": "" if robot is None else robot.id,
-            "name": "" if robot is None else robot.name,
-            "cameras": [
-                {"id": camera_number(camera), "name": camera.name} for camera in cameras
-            ],
-        }
-        if message == self._sent:
+        selected = self.map.selected
+        robots = [r for r in self.map.robots if cameras_of(r)] if self._wall else []
+        messages = {"cameras": {"op": "cameras", **_listed(selected)}}
+        if self._wall:
+            listed = [_listed(robot) for robot in robots]
+            messages["robots"] = {"op": "robots", "robots": listed}
+        if messages == self._sent:
             return
-        self._sent = message
-        self._cameras = {camera_number(camera): camera for camera in cameras}
-        self._watch(None)
-        self.browser_part.send(message)
+        before, self._sent = self._sent, messages
+        self._cameras = {
+            camera_number(camera): camera
+            for robot in (selected, *robots)
+            for camera in cameras_of(robot)
+        }
+        known = self._cameras.values()
+        self._watch([camera for camera in self._watching if camera in known])
+        for op, message in messages.items():
+            if message != before.get(op):
+                self.browser_part.send(message)
 
     def on_message(self, message: dict[str, Any]) -> None:
-        """Send the pictures of the camera that the page has chosen, or none."""
-        number = message.get("camera")
+        """Send the pictures that the page shows, or select the robot of a camera."""
         if message.get("op") == "watch":
+            self._wall = message.get("wall") is True
+            self.poll()
+            asked = message.get("cameras")
+            numbers = asked[:MOST_WATCHED] if isinstance(asked, list) else []
             # Only numbers that the page has received are valid.
-            self._watch(self._cameras.get(number) if type(number) is int else None)
+            known = self._cameras
+            self._watch([known[n] for n in numbers if type(n) is int and n in known])
+        elif message.get("op") == "select":
+            robot = self.map.find_robot(message.get("robot"))
+            if robot is not None:
+                self.map.set_selected(robot)
 
-    def _watch(self, camera: Any) -> None:
-        if self._watching is not None:
-            self._watching.remove()
-            self._watching = None
-        self._watched = camera
-        if camera is not None:
-            self._watching = camera.watch(self._show)
-            self._show()
+    def _watch(self, cameras: list[Any]) -> None:
+        for camera in [other for other in self._watching if other not in cameras]:
+            self._watching.pop(camera).remove()
+        for camera in cameras:
+            if camera not in self._watching:
+                self._watching[camera] = camera.watch(partial(self._show, camera))
+                self._show(camera)
 
-    def _show(self) -> None:
-        camera = self._watched
-        if camera is not None and camera.url is not None:
+    def _show(self, camera: Any) -> None:
+        if camera.url is not None:
             self.browser_part.send(
                 {
                     "op": "picture",
@@ -162,6 +177,17 @@ class CameraPanel:
                     "stamp": camera.stamp,
                 }
             )
+
+
+def _listed(robot: "Robot | None") -> dict[str, Any]:
+    return {
+        "robot": "" if robot is None else robot.id,
+        "name": "" if robot is None else robot.name,
+        "cameras": [
+            {"id": camera_number(camera), "name": camera.name}
+            for camera in cameras_of(robot)
+        ],
+    }
 
 
 def cameras_of(robot: "Robot | None") -> list[Any]:

@@ -1,13 +1,11 @@
-import { setHidden, setText } from "../../web/tools/elements.js";
+import { CameraCell, signButton } from "./camera_cell.js";
+import { html, setHidden, setText } from "../../web/tools/elements.js";
 
+/** @typedef {import('./camera_cell.js').Camera} Camera */
+/** @typedef {import('./camera_cell.js').RobotCameras} RobotCameras */
+/** @typedef {import('./camera_cell.js').Target} Target */
 
-
-/** @typedef {import('./camera_panel.js').Camera} Camera */
-/** @typedef {import('./camera_panel.js').Cameras} Cameras */
-
-const SVG = "http://www.w3.org/2000/svg";
-
-/** @type {Record<Dock | 'close', {label: string, path: string}>} */
+/** @type {Record<Dock | 'wall' | 'full' | 'close', import('./camera_cell.js').Sign>} */
 const SIGNS = {
   side: { label: "Beside the map", path: "M4 5h16v14H4zM10 5v14M4.5 12h5" },
   below: { label: "Above or below the map", path: "M4 5h16v14H4zM4 13h16M12 13.5v5" },
@@ -15,80 +13,132 @@ const SIGNS = {
     label: "Over the map: press again for the next corner",
     path: "M4 5h16v14H4zM11 11h6v5h-6z",
   },
+  wall: { label: "Camera wall", path: "M4 5h7v6H4zM13 5h7v6h-7zM4 13h7v6H4zM13 13h7v6h-7z" },
+  full: { label: "Full screen", path: "M14 4h6v6M20 4l-6.5 6.5M10 20H4v-6M4 20l6.5-6.5" },
   close: { label: "Close the camera", path: "M6 6l12 12M18 6L6 18" },
 };
+
+/** Most cameras of a wall. */
+export const MOST = 4;
 
 /** The visible elements of the camera's panel, and its buttons. */
 export class CameraView {
   /**
    * @param {{
-   *   choose: (id: number) => void, dock: (dock: Dock) => void, close: () => void,
+   *   choose: (id: number) => void, dock: (dock: Dock) => void, wall: () => void,
+   *   full: () => void, close: () => void, add: () => void, seen: () => void,
+   *   select: (robot: string) => void, put: (cell: CameraCell, id: number) => void,
+   *   remove: (cell: CameraCell) => void,
    * }} acts
    */
   constructor(acts) {
     this._acts = acts;
-    this._name = make("h2", "camera-name");
-    this._choice = make("div", "camera-choice");
-    this._choice.setAttribute("role", "group");
-    this._choice.setAttribute("aria-label", "Cameras");
-    this._age = make("span", "camera-age");
-    const places = make("div", "camera-places");
-    places.setAttribute("role", "group");
-    places.setAttribute("aria-label", "Position of the camera picture");
-    /** @type {Map<Dock, HTMLButtonElement>} */
+    this._name = html("h2", "camera-name", { dir: "auto" });
+    this._choice = html("div", "camera-choice", { role: "group", "aria-label": "Cameras" });
+    this._age = html("span", "camera-age");
+    /** @type {Map<string, HTMLButtonElement>} */
     this._docks = new Map();
     for (const dock of DOCKS) {
-      const button = signButton(dock, () => acts.dock(dock));
-      this._docks.set(dock, button);
-      places.append(button);
+      this._docks.set(dock, signButton(dock, SIGNS[dock], () => acts.dock(dock)));
     }
-    places.append(signButton("close", () => acts.close()));
-    this.head = make("div", "camera-head");
-    this.head.append(this._name, this._choice, this._age, places);
-    this._message = make("p", "camera-word");
-    this._message.setAttribute("role", "status");
-    this._frame = make("div", "camera-frame");
-    this._frame.append(this._message);
-    this.element = make("section", "camera-panel");
-    this.element.setAttribute("aria-label", "Camera");
+    this._wall = signButton("wall", SIGNS.wall, () => acts.wall());
+    this._full = signButton("full", SIGNS.full, () => acts.full());
+    const places = html(
+      "div",
+      "camera-places",
+      { role: "group", "aria-label": "Position of the camera picture" },
+      ...this._docks.values(),
+      this._wall,
+      this._full,
+      signButton("close", SIGNS.close, () => acts.close()),
+    );
+    this.head = html("div", "camera-head", {}, this._name, this._choice, this._age, places);
+    this._add = html("button", "button camera-add", { type: "button" }, "Add camera");
+    this._add.addEventListener("click", () => acts.add());
+    this._grid = html("div", "camera-grid", {}, this._add);
+    this.element = html("section", "camera-panel", {}, this.head, this._grid);
     this.element.hidden = true;
-    this.element.append(this.head, this._frame);
+    /** @type {CameraCell[]} */
+    this.cells = [];
     this._listed = "";
+    this._observer = new IntersectionObserver((entries) => this._look(entries));
   }
 
-  /** @param {HTMLImageElement} image */
-  show(image) {
-    image.alt = this._alt;
-    image.className = "camera-image";
-    image.draggable = false;
-    this._frame.querySelector("img")?.remove();
-    this._frame.prepend(image);
-  }
-
-  clear() {
-    this._frame.querySelector("img")?.remove();
-  }
-
-  get _alt() {
-    return `Picture of ${this._name.textContent}`;
+  destroy() {
+    this._observer.disconnect();
+    this.element.remove();
   }
 
   /**
+   * @param {Target[]} targets What the cells show; none closes the panel.
    * @param {boolean} open
-   * @param {Dock} dock
-   * @param {Cameras} there
-   * @param {Camera | null} camera
+   * @param {Dock | 'full'} dock
+   * @param {Camera[]} cameras Of the selected robot.
+   * @param {RobotCameras[] | null} robots What the choosers of a wall list.
    */
-  open(open, dock, there, camera) {
+  open(targets, open, dock, cameras, robots) {
+    const wall = robots !== null;
     setHidden(this.element, !open);
-    if (!open || camera === null) return;
     this.element.dataset.dock = dock;
-    this.element.dataset.robot = there.robot;
-    setText(this._name, `${there.name}: ${camera.name}`);
+    this.element.classList.toggle("wall", wall);
+    this.element.setAttribute("aria-label", wall ? "Camera wall" : "Camera");
+    this._fill(targets, wall);
+    if (!open) return;
+    targets.forEach((target, index) => this.cells[index].use(target, robots));
     for (const [which, button] of this._docks) {
       button.setAttribute("aria-pressed", String(which === dock));
     }
-    this._list(there.cameras, camera);
+    this._wall.setAttribute("aria-pressed", String(wall));
+    this._full.setAttribute("aria-pressed", String(dock === "full"));
+    this._grid.dataset.cells = String(Math.min(MOST, targets.length + 1));
+    setHidden(this._add, !wall || targets.length >= MOST);
+    this._add.disabled = nextCamera(robots ?? [], targets, "") === null;
+    const [{ name, label, camera }] = [...targets, { name: "", label: "", camera: null }];
+    setText(this._name, wall ? "Cameras" : `${name}: ${label}`);
+    setHidden(this._age, wall);
+    setHidden(this._choice, wall || cameras.length < 2);
+    if (!wall && camera) this._list(cameras, camera);
+  }
+
+  /**
+   * Make as many cells as there are cameras. The cells of a wall keep their places.
+   *
+   * @param {Target[]} targets
+   * @param {boolean} wall
+   */
+  _fill(targets, wall) {
+    while (this.cells.length > targets.length) this.drop(this.cells[this.cells.length - 1]);
+    while (this.cells.length < targets.length) {
+      const cell = new CameraCell(this._acts);
+      this.cells.push(cell);
+      this._add.before(cell.element);
+    }
+    this._observer.disconnect();
+    for (const cell of this.cells) {
+      if (wall) this._observer.observe(cell.element);
+      else cell.seen = true;
+    }
+  }
+
+  /** @param {CameraCell} cell */
+  drop(cell) {
+    this.cells = this.cells.filter((other) => other !== cell);
+    this._observer.unobserve(cell.element);
+    cell.element.remove();
+  }
+
+  /** @param {IntersectionObserverEntry[]} entries */
+  _look(entries) {
+    let changed = false;
+    for (const { target, isIntersecting } of entries) {
+      const cell = this.cells.find(({ element }) => element === target);
+      if (!cell || cell.seen === isIntersecting) continue;
+      // The waiting time while the cell was out of view does not count.
+      cell.restart();
+      cell.seen = isIntersecting;
+      changed = true;
+    }
+    if (changed) this._acts.seen();
   }
 
   /**
@@ -100,15 +150,12 @@ export class CameraView {
     if (listed !== this._listed) {
       this._listed = listed;
       const buttons = cameras.map(({ id, name }) => {
-        const button = make("button", "button");
-        button.type = "button";
-        button.textContent = name;
-        button.dataset.choice = String(id);
+        const attributes = { type: "button", "data-choice": String(id) };
+        const button = html("button", "button", attributes, name);
         button.addEventListener("click", () => this._acts.choose(id));
         return button;
       });
       this._choice.replaceChildren(...buttons);
-      setHidden(this._choice, cameras.length < 2);
     }
     for (const button of this._choice.querySelectorAll("button")) {
       const pressed = button.dataset.choice === String(chosen.id);
@@ -117,65 +164,62 @@ export class CameraView {
   }
 
   /**
-   * @param {number} age In ms; without a picture, the waiting time.
-   * @param {boolean} shown Whether there is a picture.
-   * @param {boolean} old
-   * @param {boolean} mine Whether this page has control of the robot.
+   * Show the ages.
+   *
+   * @param {string} selected The selected robot.
+   * @param {(robot: string) => boolean} mine Whether this page has control of a robot.
    */
-  showAge(age, shown, old, mine) {
-    this.element.classList.toggle("stale", old);
-    setText(this._age, shown ? ageText(age) : "");
-    // Whole seconds, so that a screen reader does not read ten values a second.
-    const seconds = Math.floor(age / 1000);
-    let words = "";
-    if (!shown && !old) words = "Waiting for a picture.";
-    else if (!shown) words = "No picture yet.";
-    else if (old) words = seconds < 60 ? "Frozen." : "Frozen for over a minute.";
-    if (old && mine) {
-      words += " Commands are ignored: choose another camera or close this one.";
+  look(selected, mine) {
+    for (const cell of this.cells) {
+      const { robot } = cell.target;
+      cell.look(robot === selected, mine(robot));
     }
-    setText(this._message, words);
+    setText(this._age, this.cells[0]?.age ?? "");
+    this._age.classList.toggle("stale", this.cells[0]?.old === true);
   }
 }
 
-/** @param {number} age */
-function ageText(age) {
-  const seconds = age / 1000;
-  if (seconds < 10) return `${seconds.toFixed(1)} s`;
-  return seconds < 100 ? `${Math.round(seconds)} s` : `${Math.round(seconds / 60)} min`;
+/**
+ * @param {RobotCameras[]} robots
+ * @param {Place} place
+ * @returns {Target} The camera of a place of the wall: after a restart of the display it
+ *     has another id, but the same names.
+ */
+export function cameraAt(robots, { robot, name, camera, id }) {
+  const owner = robots.find((one) => one.robot === robot) ?? null;
+  const named = owner?.cameras.filter((one) => one.name === camera) ?? [];
+  const found = named.find((one) => one.id === id) ?? named.at(0) ?? null;
+  return { robot, name: owner?.name ?? name, label: camera, camera: found };
 }
 
 /**
- * @template {keyof HTMLElementTagNameMap} K
- * @param {K} tag
- * @param {string} className
+ * @param {RobotCameras[]} robots
+ * @param {number} id
+ * @returns {Place | null} The place of a wall that shows a camera.
  */
-function make(tag, className) {
-  const element = document.createElement(tag);
-  element.className = className;
-  return element;
+export function placeOf(robots, id) {
+  for (const { robot, name, cameras } of robots) {
+    const camera = cameras.find((one) => one.id === id);
+    if (camera) return { robot, name, camera: camera.name, id };
+  }
+  return null;
 }
 
 /**
- * @param {Dock | 'close'} what
- * @param {() => void} act
+ * @param {RobotCameras[]} robots
+ * @param {Target[]} targets The cameras of a wall.
+ * @param {string} selected The selected robot.
+ * @returns {Place | null} The camera to add: of the selected robot, of a robot without a
+ *     camera on the wall, or any other one.
  */
-function signButton(what, act) {
-  const { label, path } = SIGNS[what];
-  const button = make("button", `button square quiet camera-${what}`);
-  button.type = "button";
-  button.title = label;
-  button.setAttribute("aria-label", label);
-  const icon = document.createElementNS(SVG, "svg");
-  icon.setAttribute("class", "icon");
-  icon.setAttribute("viewBox", "0 0 24 24");
-  icon.setAttribute("aria-hidden", "true");
-  const line = document.createElementNS(SVG, "path");
-  line.setAttribute("d", path);
-  icon.append(line);
-  button.append(icon);
-  button.addEventListener("click", act);
-  return button;
+export function nextCamera(robots, targets, selected) {
+  const shown = new Set(targets.map(({ camera }) => camera?.id));
+  const own = robots.filter(({ robot }) => robot === selected);
+  const others = robots.filter(({ robot }) => targets.every((one) => one.robot !== robot));
+  const first = [...own, ...others].flatMap(({ cameras }) => cameras.slice(0, 1));
+  const all = [...first, ...robots.flatMap(({ cameras }) => cameras)];
+  const next = all.find(({ id }) => !shown.has(id));
+  return next ? placeOf(robots, next.id) : null;
 }
 
 /**
@@ -189,6 +233,14 @@ function signButton(what, act) {
  * @property {string} camera The name of the camera that was chosen last.
  * @property {number} x Position while floating: share of the free room, from 0 to 1.
  * @property {number} y
+ * @property {boolean} wall Whether the panel shows the wall.
+ * @property {Place[]} cells The cameras of the wall.
+ *
+ * @typedef {object} Place A camera on the wall.
+ * @property {string} robot
+ * @property {string} name The name of the robot.
+ * @property {string} camera The name of the camera.
+ * @property {number} id
  */
 
 const DOCKS = /** @type {const} */ (["side", "below", "float"]);
@@ -215,7 +267,15 @@ export function readState() {
     camera: typeof stored?.camera === "string" ? stored.camera : "",
     x: part(stored?.x, 0),
     y: part(stored?.y, 0),
+    wall: stored?.wall === true,
+    cells: Array.isArray(stored?.cells) ? stored.cells.filter(isPlace).slice(0, MOST) : [],
   };
+}
+
+/** @param {any} value */
+function isPlace(value) {
+  const texts = [value?.robot, value?.name, value?.camera];
+  return texts.every((text) => typeof text === "string") && typeof value.id === "number";
 }
 
 /** @param {PanelState} kept */

@@ -46,7 +46,9 @@ export function takesKeys(target) {
  *     (`data-hands-off`).
  */
 function isCovered() {
-  if (document.fullscreenElement?.matches(":modal")) return true;
+  const full = document.fullscreenElement;
+  // The whole page in full screen covers nothing.
+  if (full !== document.documentElement && full?.matches(":modal")) return true;
   return [...document.getElementsByTagName("dialog")].some(
     (dialog) => dialog.open && (dialog.matches(":modal") || "handsOff" in dialog.dataset),
   );
