@@ -27,6 +27,7 @@ NOT_AT_REST = {
     "Name?": "of a page whose operator has no name yet",
     "Pause": "of a route that runs",
     "Release control": "of a robot that this page has",
+    "Remove from the wall": "of a camera on the wall of cameras",
     "Request control": "of a robot that another operator has",
     "Reset all": "of a STOP of several robots",
     "Selected robot": "of a map with several robots that have layers",

@@ -199,11 +199,11 @@ def test_a_wall_without_storage_shows_only_cells_in_view_on_a_phone(open_page, r
     wall = open_wall(page)
     wall.locator(".camera-add").click()
     expect(wall.locator(".camera-cell")).to_have_count(3)
-    left, middle, right = wall.locator(".camera-cell").all()
-    assert left.bounding_box()["x"] == right.bounding_box()["x"]
+    first, last = (wall.locator(".camera-cell").nth(index) for index in (0, 2))
+    assert first.bounding_box()["x"] == last.bounding_box()["x"]
     grid = wall.locator(".camera-grid")
     grid.evaluate("grid => grid.scrollTo(0, 0)")
-    expect(right).not_to_be_in_viewport()
+    expect(last).not_to_be_in_viewport()
     wait_for_subscriptions(robots, "Bob", LONG)
     grid.evaluate("grid => grid.scrollTo(0, 9999)")
     wait_for_subscriptions(robots, LONG, "Cid")
