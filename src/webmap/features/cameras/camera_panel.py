@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import secrets
 import time
 import weakref
 from functools import partial
@@ -13,7 +14,8 @@ from webmap.features.cameras.camera import AGE_LIMIT
 if TYPE_CHECKING:
     from webmap import Element, Map, Robot
 
-_numbers = itertools.count(1)
+# A page that was open before a restart must not get pictures of another camera.
+_numbers = itertools.count(secrets.randbelow(1 << 40))
 _number_of: "weakref.WeakKeyDictionary[Any, int]" = weakref.WeakKeyDictionary()
 
 
@@ -201,7 +203,7 @@ def is_camera(module: object) -> bool:
 
 
 def camera_number(camera: Any) -> int:
-    """Return a camera's number on pages; unique in the process."""
+    """Return a camera's number on pages; unique, also after a restart."""
     if camera not in _number_of:
         _number_of[camera] = next(_numbers)
     return _number_of[camera]
