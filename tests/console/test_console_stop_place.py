@@ -159,9 +159,9 @@ def in_one_state_each(page: Page, look: Callable[[str], None]) -> None:
     look("the sheet of a phone")
     page.evaluate("document.querySelector('#sheet').click()")
     camera(page)
-    for dock in ("side", "below", "float"):
-        page.evaluate(f"document.querySelector('.camera-{dock}').click()")
-        look(f"the camera, {dock}")
+    for button in ("side", "below", "float", "wall", "full"):
+        page.evaluate(f"document.querySelector('.camera-{button}').click()")
+        look(f"the camera, {button}")
     page.locator(".camera-close").click()
 
 

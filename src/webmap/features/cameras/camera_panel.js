@@ -159,7 +159,7 @@ class CameraPanel {
   }
 
   /**
-   * Show a camera, and open its panel.
+   * Show a camera alone, and open its panel.
    *
    * @param {number} id
    */
@@ -167,7 +167,7 @@ class CameraPanel {
     const camera = this._there.cameras.find((one) => one.id === id);
     if (!camera) return;
     this._camera = camera;
-    this._change({ open: true, camera: camera.name });
+    this._change({ open: true, wall: false, camera: camera.name });
   }
 
   /**
