@@ -122,8 +122,10 @@ def open_page(chromium, url):
 
 
 def open_wall(page: Page, cells: int = 2):
-    """Open the wall as the palette does, also without a selected robot."""
-    page.locator(".camera-panel .camera-wall").dispatch_event("click")
+    """Open the wall with the palette, without a selected robot."""
+    page.keyboard.press("Control+k")
+    page.locator("#palette-field").fill("camera wall")
+    page.keyboard.press("Enter")
     wall = page.get_by_role("region", name="Camera wall")
     expect(wall.locator(".camera-cell")).to_have_count(cells)
     return wall

@@ -108,14 +108,15 @@ class CameraPanel {
   }
 
   destroy() {
+    this._setFull(false);
     this._ending.abort();
     this._leave();
     this._offEscape();
-    this._setFull(false);
     clearInterval(this._timer);
     this._goesBy();
     this._view.destroy();
     delete document.body.dataset.camera;
+    delete document.body.dataset.cameraWall;
   }
 
   /** @param {Cameras | Robots | Picture} message */
@@ -142,6 +143,7 @@ class CameraPanel {
     const chosen = same && cameras.find(({ id }) => id === this._camera?.id);
     const named = cameras.find(({ name }) => name === this._kept.camera);
     this._camera = chosen || named || cameras.at(0) || null;
+    if (!this._open) this._setFull(false);
     this._show();
   }
 
