@@ -1,5 +1,11 @@
 import { NewestPicture } from "./newest_picture.js";
-import { html, setAttribute, setHidden, setText, svg } from "../../web/tools/elements.js";
+import {
+  html,
+  setAttribute,
+  setHidden,
+  setText,
+  svg,
+} from "../../web/tools/elements.js";
 
 /**
  * A camera of a robot, as the display lists it, and the cameras of one robot.
@@ -34,7 +40,8 @@ export class CameraCell {
     /** Whether the cell is in view: the others get no pictures. */
     this.seen = true;
     this.picture = new NewestPicture(loadImage, (image) => this._show(image));
-    this._robot = html("button", "button quiet camera-robot", { type: "button", dir: "auto" });
+    const attributes = { type: "button", dir: "auto" };
+    this._robot = html("button", "button quiet camera-robot", attributes);
     this._robot.addEventListener("click", () => acts.select(this.target.robot));
     this._choice = html("select", "button camera-chooser", {
       "aria-label": "Camera",
@@ -49,11 +56,13 @@ export class CameraCell {
       acts.put(this, Number(this._choice.value));
     });
     const remove = signButton("remove", REMOVE, () => acts.remove(this));
-    this._caption = html("div", "camera-caption", {}, this._robot, this._choice, remove);
+    const parts = [this._robot, this._choice, remove];
+    this._caption = html("div", "camera-caption", {}, ...parts);
     this._age = html("span", "camera-cell-age");
     this._message = html("p", "camera-word", { role: "status" });
     this._frame = html("div", "camera-frame", {}, this._message, this._age);
-    this.element = html("div", "camera-cell", { role: "group" }, this._caption, this._frame);
+    const both = [this._caption, this._frame];
+    this.element = html("div", "camera-cell", { role: "group" }, ...both);
     this._listed = "";
   }
 
@@ -81,7 +90,7 @@ export class CameraCell {
     if (listed === this._listed) return;
     this._listed = listed;
     const groups = robots.map(({ name, cameras }) => {
-      const options = cameras.map((one) => html("option", "", { value: `${one.id}` }, one.name));
+      const options = cameras.map((one) => new Option(one.name, String(one.id)));
       return html("optgroup", "", { label: name, dir: "auto" }, ...options);
     });
     const lost = html("option", "", { value: "", disabled: "" }, label);

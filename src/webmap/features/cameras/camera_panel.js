@@ -26,6 +26,7 @@ import { closeSheet } from "../../web/tools/elements.js";
 /** @typedef {{op: 'cameras'} & RobotCameras} Cameras Of the selected robot. */
 /** @typedef {{op: 'robots', robots: RobotCameras[]}} Robots For the wall. */
 /** @typedef {{op: 'picture', camera: number, url: string, stamp: number}} Picture */
+/** @typedef {Cameras | Robots | Picture} Message */
 
 /** Milliseconds between two updates of the age. */
 const PERIOD = 100;
@@ -42,7 +43,7 @@ const PERIOD = 100;
 export default function attach(map, _options, send) {
   const panel = new CameraPanel(map, send);
   return {
-    receive: (/** @type {Cameras | Robots | Picture} */ message) => panel.receive(message),
+    receive: (/** @type {Message} */ message) => panel.receive(message),
     destroy: () => panel.destroy(),
   };
 }
@@ -78,7 +79,8 @@ class CameraPanel {
       add: () => this._add(nextCamera(this._robots, this._targets, this._there.robot)),
       seen: () => this._rely(),
       select: (robot) => this._send({ op: "select", robot }),
-      put: (cell, id) => this._put(this._view.cells.indexOf(cell), placeOf(this._robots, id)),
+      put: (cell, id) =>
+        this._put(this._view.cells.indexOf(cell), placeOf(this._robots, id)),
       remove: (cell) => this._remove(cell),
     });
     this._ending = new AbortController();
@@ -119,7 +121,7 @@ class CameraPanel {
     delete document.body.dataset.cameraWall;
   }
 
-  /** @param {Cameras | Robots | Picture} message */
+  /** @param {Message} message */
   receive(message) {
     if (message.op === "cameras") this._take(message);
     else if (message.op === "robots") this._takeAll(message.robots);
@@ -127,8 +129,9 @@ class CameraPanel {
       const { clock } = this._map;
       const age = clock === null ? 0 : 1000 * (clock - message.stamp);
       const url = resolve(message.url, document.baseURI);
+      if (url === null) return;
       for (const { target, picture } of this._view.cells) {
-        if (url !== null && target.camera?.id === message.camera) picture.offer(url, age);
+        if (target.camera?.id === message.camera) picture.offer(url, age);
       }
     }
   }
@@ -190,7 +193,8 @@ class CameraPanel {
   /** @returns {Target[]} What the cells show. */
   get _targets() {
     if (!this._open) return [];
-    if (this._kept.wall) return this._kept.cells.map((place) => cameraAt(this._robots, place));
+    const { wall, cells } = this._kept;
+    if (wall) return cells.map((place) => cameraAt(this._robots, place));
     const { robot, name } = this._there;
     return [{ robot, name, label: this._camera?.name ?? "", camera: this._camera }];
   }
@@ -303,7 +307,8 @@ class CameraPanel {
     if (open) document.body.dataset.camera = dock;
     else delete document.body.dataset.camera;
     document.body.toggleAttribute("data-camera-wall", open && wall);
-    this._view.open(this._targets, open, dock, this._there.cameras, wall ? this._robots : null);
+    const robots = wall ? this._robots : null;
+    this._view.open(this._targets, open, dock, this._there.cameras, robots);
     // Over the map, but below the panels for driving and STOP.
     const over = dock === "float" || dock === "full";
     const before = over ? this._map.svg : this._map.svg.parentElement;
