@@ -136,6 +136,31 @@ def test_the_view_moves_as_little_as_possible_to_uncover_the_robot_and_back(
     assert turn(page, TURNS[0]) == zoomed
 
 
+def test_the_view_uncovers_the_robot_beside_the_camera_and_the_wall_and_moves_back(
+    open_console,
+):
+    page = open_console()
+    page.set_viewport_size(WIDE)
+    select(page, "Robot 1")
+    map = page.locator("svg.webmap").bounding_box()
+    [(x, _)] = page.locator(".robot.selected").evaluate_all(
+        "all => all.map(r => (({ e, f }) => [e, f])(r.getScreenCTM()))"
+    )
+    # To where the camera covers the robot.
+    page.mouse.move(map["x"] + 600, map["y"] + 20)
+    page.mouse.down()
+    page.mouse.move(map["x"] + 600 + map["x"] + 100 - x, map["y"] + 20, steps=4)
+    page.mouse.up()
+    before = page.evaluate(PLACES)
+    camera = turn(page, "#card [title^='Show the camera']")
+    wall = turn(page, ".camera-wall")
+    assert page.evaluate(ROBOT) == "free"
+    for places in (camera, wall):
+        assert all(x > was_x for (x, _), (was_x, _) in zip(places, before, strict=True))
+    assert turn(page, ".camera-wall") == camera
+    assert turn(page, "[aria-label='Close the camera']") == before
+
+
 def width_of_panel(page: Page) -> float:
     return page.evaluate(SIZE, "#panel")[0]
 

@@ -192,8 +192,10 @@ export function keepInView(map, signal) {
   /** By how much the view was moved to uncover the robot, in pixels. */
   let [x, y] = [0, 0];
   const check = () => {
-    const before = area;
-    area = map.svg.getBoundingClientRect();
+    const [before, now] = [area, map.svg.getBoundingClientRect()];
+    // The map has not adapted its view yet; its new size comes here next.
+    if (Math.abs(now.width - map.width) > 1 || Math.abs(now.height - map.height) > 1) return;
+    area = now;
     [width, height] = [map.width, map.height];
     if (map.following || !map.selected) return;
     const [left, top] = placeOnScreen(map, map.selected) ?? [Number.NaN, Number.NaN];
