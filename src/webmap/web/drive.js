@@ -135,9 +135,9 @@ export class Drive {
 
   // Inputs ---------------------------------------------------------------------
 
-  /** @param {string} why Why a gamepad cannot drive; empty when it is gone. */
-  refuseGamepad(why) {
-    this._listeners.emit("gamepad", why);
+  /** @param {DriveEvents["gamepad"]} notice What the page shows about a gamepad. */
+  showGamepad(notice) {
+    this._listeners.emit("gamepad", notice);
   }
 
   /**

@@ -72,8 +72,9 @@ export class Notices {
    * @param {string} key
    * @param {string} text
    * @param {"status" | "alert"} [role]
+   * @param {{name: string, act: () => void} | null} [action] A button of the notice.
    */
-  show(key, text, role = "status") {
+  show(key, text, role = "status", action = null) {
     this._stay(key);
     const known = this._shown.get(key);
     if (known) {
@@ -88,7 +89,15 @@ export class Notices {
     const words = document.createElement("span");
     words.textContent = text;
     notice.append(words);
-    if (role === "alert") notice.append(this._dismisser(key));
+    if (action) {
+      const go = pressable(action.name, () => {
+        this.hide(key);
+        action.act();
+      });
+      go.className = "act";
+      notice.append(go);
+    }
+    if (role === "alert" || action) notice.append(this._dismisser(key));
     this._shown.set(key, notice);
     this._open().append(notice);
     this._limit();
@@ -119,14 +128,11 @@ export class Notices {
 
   /** @param {string} key */
   _dismisser(key) {
-    const button = document.createElement("button");
-    button.type = "button";
-    button.textContent = "×";
-    button.setAttribute("aria-label", "Dismiss");
-    button.addEventListener("click", () => {
+    const button = pressable("×", () => {
       this._dismissed.set(key, performance.now());
       this.hide(key);
     });
+    button.setAttribute("aria-label", "Dismiss");
     return button;
   }
 
@@ -195,6 +201,18 @@ export class Notices {
   _texts() {
     return [...this._shown.values()].map(({ textContent }) => textContent);
   }
+}
+
+/**
+ * @param {string} text
+ * @param {() => void} act
+ */
+function pressable(text, act) {
+  const button = document.createElement("button");
+  button.type = "button";
+  button.textContent = text;
+  button.addEventListener("click", act);
+  return button;
 }
 
 /** @param {HTMLElement} notice */

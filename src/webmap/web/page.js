@@ -100,9 +100,11 @@ export class Page {
     if (this._drive) return this._drive;
     if (!this._driving) throw new Error("drive.js has not been loaded");
     this._drive = new this._driving.Drive(BASE, { id: this.id });
-    this._drive.on("gamepad", (why) => {
-      if (why) this.notices.show("gamepad", why, "alert");
-      else this.notices.hide("gamepad");
+    this._drive.on("gamepad", ({ kind, text, settings }) => {
+      const key = `gamepad ${kind}`;
+      const act = settings ? { name: "Gamepad settings", act: settings } : null;
+      if (!text) this.notices.hide(key);
+      else this.notices.show(key, text, kind === "refused" ? "alert" : "status", act);
     });
     return this._drive;
   }

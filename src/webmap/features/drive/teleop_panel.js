@@ -70,6 +70,7 @@ export class Panel {
     this._fold.setAttribute("aria-expanded", "false");
     const confirmed = [this._reset.element, this._tester.element];
     const buttons = [this._lease, ...confirmed, this._stick, this._fold];
+    this._acts = html("div", "webmap-teleop-acts", {}, ...buttons);
     this.element = html(
       "section",
       "webmap-panel webmap-teleop",
@@ -81,7 +82,7 @@ export class Panel {
         {},
         ...[state, this._test, this._speed, this._cap, this._own],
       ),
-      html("div", "webmap-teleop-acts", {}, ...buttons),
+      this._acts,
       this.stop,
       this._figures,
     );
@@ -102,6 +103,11 @@ export class Panel {
     const cap = report ? capOf(report) + (stated ? "" : slowness(age)) : "";
     setText(this._cap, cap);
     setAttribute(this._cap, "title", cap);
+  }
+
+  /** @param {HTMLElement} element A button of another part, beside those of this panel. */
+  addButton(element) {
+    this._acts.append(element);
   }
 
   /** Fold the figures out or in, on a page where the panel is one line. */

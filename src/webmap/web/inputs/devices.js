@@ -6,8 +6,9 @@
  */
 
 import { takesKeys, takesText } from "./focus.js";
-import { Gamepads } from "./sticks.js";
+import { Gamepads } from "./gamepads.js";
 import { Keys } from "./keys.js";
+import { PadMaps } from "./pad_maps.js";
 
 /** @typedef {import('../drive.js').Drive} Drive */
 /** @typedef {import('./keys.js').StopKey} StopKey */
@@ -60,11 +61,19 @@ export class Devices {
     this._keys = null;
     /** @type {Gamepads | null} */
     this._pads = null;
+    this.padMaps = new PadMaps();
+    /** What opens the settings of gamepads. @type {(() => void) | null} */
+    this.padSettings = null;
   }
 
-  /** Whether there is a gamepad for driving. */
+  /** The gamepads of the page; null while nothing uses them. */
+  get pads() {
+    return this._pads;
+  }
+
+  /** What is held and moved to drive with a gamepad; empty without one. */
   get gamepad() {
-    return this._pads?.present ?? false;
+    return this._pads?.controls ?? "";
   }
 
   /** Whether a gamepad's dead-man button is held without effect. */
@@ -88,7 +97,12 @@ export class Devices {
       wanted: () => this.active?.robot() != null,
       holonomic: () => this.active?.holonomic ?? false,
     };
-    this._pads ??= new Gamepads(this._drive, owner);
+    this._pads ??= new Gamepads(this._drive, {
+      ...owner,
+      maps: this.padMaps,
+      stopByPad: () => this._stopOne(),
+      settings: () => this.padSettings,
+    });
     this._keys ??= new Keys(this._drive, {
       ...owner,
       stop: (event, how) => this._stop(event, how),
@@ -197,9 +211,14 @@ export class Devices {
       if (!held && uses(closesMenu)) return true;
       for (const leave of this._escapes) if (uses(leave)) return true;
     }
-    // Without a robot the key means all: an unnecessary STOP is harmless.
-    this._drive.stop(driven ?? choice ?? "*");
+    this._stopOne();
     return true;
+  }
+
+  /** Without a robot this stops all: an unnecessary STOP is harmless. */
+  _stopOne() {
+    const { driven, choice } = this._drive.status;
+    this._drive.stop(driven ?? choice ?? "*");
   }
 }
 

@@ -315,8 +315,8 @@ export class ControlRequests {
  * `robot`: the gate's newest report on a robot. `gone`: the gate does not know a robot any
  * more. `state`: the link's state changed. `refused`: the gate refused an operation.
  * `stop`: STOP was sent for a robot or "*". `goal`: a goal was sent for a robot.
- * `gamepad`: why a gamepad cannot drive, in a sentence; empty when it is gone. `read`:
- * inputs without events of their own (gamepads) must be read now. `drop`: inputs must
+ * `gamepad`: why a gamepad cannot drive, or how one drives, in sentences; empty when that
+ * is over. `read`: inputs without events of their own (gamepads) must be read now. `drop`: inputs must
  * forget what is pressed. `step`: a 20 Hz step has ended.
  *
  * @typedef {object} DriveEvents
@@ -326,10 +326,17 @@ export class ControlRequests {
  * @property {{robot: string | null, what: string, why: string}} refused
  * @property {string} stop
  * @property {string} goal
- * @property {string} gamepad
+ * @property {GamepadNotice} gamepad
  * @property {null} read
  * @property {null} drop
  * @property {null} step
+ */
+
+/**
+ * @typedef {object} GamepadNotice
+ * @property {"refused" | "hint"} kind
+ * @property {string} text
+ * @property {(() => void) | null} settings Opens the settings of gamepads.
  */
 
 /** @typedef {{[K in keyof DriveEvents]: [kind: K, event: DriveEvents[K]]}[keyof DriveEvents]} DriveEvent */

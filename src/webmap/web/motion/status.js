@@ -49,11 +49,12 @@ const KEYS = "W A S D or the arrow keys";
 /**
  * Return the available inputs, as text.
  *
- * @param {{touch: boolean, stick: boolean, gamepad: boolean}} what `touch`: whether
- *     the pointer is a finger, so that there may be no keyboard.
+ * @param {{touch: boolean, stick: boolean, gamepad: string}} what `touch`: whether
+ *     the pointer is a finger, so that there may be no keyboard. `gamepad`: what is held
+ *     and moved on a gamepad; empty without one.
  */
 export function inputsOf({ touch, stick, gamepad }) {
-  const pad = gamepad ? ", or LB and the left stick of the gamepad" : "";
+  const pad = gamepad ? `, or ${gamepad} of the gamepad` : "";
   if (touch && stick) return `the stick${pad}`;
   return `${stick ? "W A S D, the arrow keys or the stick" : KEYS}${pad}`;
 }

@@ -1,0 +1,253 @@
+import { devicesOf } from "../../web/inputs/devices.js";
+import { listed } from "../../web/inputs/gamepads.js";
+import {
+  Finder,
+  ZONES,
+  assign,
+  axesOfPad,
+  axisName,
+  buttonName,
+  isComplete,
+  nameOf,
+} from "../../web/inputs/pad_maps.js";
+import { button, html, setHidden, setText, svg } from "../../web/tools/elements.js";
+import { Picture } from "./gamepad_picture.js";
+
+/** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
+/** @typedef {import('../../web/motion/inputs.js').Axes} Axes */
+/** @typedef {import('../../web/inputs/pad_maps.js').Pad} Pad */
+/** @typedef {import('../../web/inputs/pad_maps.js').AxisAction} AxisAction */
+/** @typedef {import('../../web/inputs/pad_maps.js').ButtonAction} ButtonAction */
+/** @typedef {AxisAction | ButtonAction} Action */
+
+const NAME = "Gamepad settings";
+const ICON =
+  "M7.5 7h9c4 0 6 10 4 11s-4-4-5.5-4H9c-1.5 0-3.5 5-5.5 4s0-11 4-11zM8 8.5v4M6 10.5h4M16.5 10.5h.1";
+
+/** @type {readonly ButtonAction[]} */
+const BY_BUTTON = ["hold", "stop"];
+
+const NOTHING = "No gamepad is connected. Connect one and press a button of the gamepad.";
+const READY = "Here no input moves a robot. The STOP of the gamepad works here too.";
+const MISSING =
+  "This gamepad has no standard layout. Assign forward, turn, the button to hold, and STOP.";
+
+/** What each action does, on a base that moves sideways, and what to do to assign it.
+ * @type {Readonly<Record<Action, [usual: string, sideways: string, how: string]>>} */
+const ACTIONS = {
+  ahead: ["Forward, back", "Forward, back", "Push a stick forward, then let it go."],
+  side: ["Turn", "Sideways", "Push a stick to the left, then let it go."],
+  spin: ["", "Turn", "Push a stick to the left, then let it go."],
+  hold: ["Hold to drive", "Hold to drive", "Press the button that is held to drive."],
+  stop: ["STOP", "STOP", "Press the button for STOP."],
+};
+
+/** The settings of gamepads: a dialog that is not modal, because STOP must work. */
+export class GamepadPanel {
+  /** @param {MapCanvas} map */
+  constructor(map) {
+    this._map = map;
+    this._devices = devicesOf(map.drive);
+    this._maps = this._devices.padMaps;
+    /** Shown beside the buttons of driving while there is a gamepad. */
+    this.go = button("webmap-gamepad-go", "", () => this.open());
+    this.go.title = NAME;
+    this.go.setAttribute("aria-label", NAME);
+    const drawing = { viewBox: "0 0 24 24", class: "webmap-symbol", "aria-hidden": "true" };
+    this.go.append(svg("svg", drawing, svg("path", { d: ICON })));
+    this.go.hidden = true;
+    this._open = () => this.open();
+    this._devices.padSettings = this._open;
+    /** @type {Pad | null} */
+    this._pad = null;
+    /** @type {Picture | null} */
+    this._picture = null;
+    /** The action that is being assigned. @type {{action: Action, finder: Finder} | null} */
+    this._assigning = null;
+    this._title = html("h2", "");
+    this._say = html("p", "webmap-gamepad-say", { role: "status" });
+    this._place = html("div", "");
+    this._rows = new Map(Object.keys(ACTIONS).map((key) => {
+      const action = /** @type {Action} */ (key);
+      return [action, new Row(() => this._assign(action))];
+    }));
+    const { least, most } = ZONES;
+    const range = { type: "range", min: `${least}`, max: `${most}`, step: "0.01" };
+    this._zone = html("input", "", range);
+    this._share = html("output", "");
+    this._zone.addEventListener("input", () => this._set({ zone: Number(this._zone.value) }));
+    const rows = [...this._rows.values()].map(({ element }) => element);
+    const close = button("", "Close", () => this._dialog.close());
+    const restore = button("", "Restore defaults", () => this._restore());
+    this._dialog = html(
+      "dialog",
+      // On the console's page it has the form and the place of the help.
+      "webmap-panel webmap-gamepad help",
+      { "aria-label": NAME, "data-hands-off": "", "data-webmap-menu": "" },
+      html("div", "webmap-gamepad-head", {}, this._title, close),
+      this._say,
+      html(
+        "div",
+        "webmap-gamepad-parts",
+        {},
+        html("div", "", {}, this._place, html("label", "", {}, "Dead zone", this._zone, this._share)),
+        html("div", "", {}, html("ul", "", {}, ...rows), restore),
+      ),
+    );
+    document.body.append(this._dialog);
+    this._offs = [
+      map.drive.on("stop", () => this._dialog.close()),
+      map.drive.on("step", () => setHidden(this.go, !this._devices.pads?.seen)),
+    ];
+  }
+
+  destroy() {
+    for (const off of this._offs) off();
+    this._dialog.remove();
+    this.go.remove();
+    if (this._devices.padSettings === this._open) this._devices.padSettings = null;
+  }
+
+  open() {
+    if (this._dialog.open) return;
+    this._map.drive.goNeutral();
+    this._devices.pads?.hideHint();
+    this._dialog.show();
+    this._pad = null;
+    this._assigning = null;
+    this._draw();
+  }
+
+  _draw() {
+    if (!this._dialog.open) return;
+    requestAnimationFrame(() => this._draw());
+    this._choose();
+    const pad = this._pad;
+    setHidden(this._place, pad === null);
+    for (const { element } of this._rows.values()) setHidden(element, pad === null);
+    setText(this._title, pad ? nameOf(pad) : "Gamepad");
+    if (pad === null) {
+      setText(this._say, NOTHING);
+      return;
+    }
+    this._find(pad);
+    this._show(pad);
+  }
+
+  /** Show the gamepad whose button is pressed, or the one that was shown. */
+  _choose() {
+    const pads = listed().filter((pad) => pad?.connected);
+    const same = pads.find((pad) => pad && this._pad && isSame(pad, this._pad));
+    const used = pads.find((pad) => pad?.buttons.some(({ pressed }) => pressed));
+    const current = this._devices.pads?.current;
+    const first = pads.find((pad) => pad && current && isSame(pad, current)) ?? pads[0];
+    const pad = (this._assigning ? same : (used ?? same)) ?? first ?? null;
+    if (!pad || !this._pad || !isSame(pad, this._pad)) {
+      this._assigning = null;
+      this._picture = pad ? new Picture(pad) : null;
+      this._place.replaceChildren(...(this._picture ? [this._picture.element] : []));
+      this._zone.value = pad ? `${this._maps.of(pad).zone}` : "";
+      setText(this._say, pad && !isComplete(this._maps.of(pad)) ? MISSING : READY);
+    }
+    this._pad = pad;
+  }
+
+  /** @param {Action} action */
+  _assign(action) {
+    const again = this._assigning?.action === action;
+    const kind = BY_BUTTON.includes(/** @type {ButtonAction} */ (action)) ? "button" : "axis";
+    this._assigning = again ? null : { action, finder: new Finder(kind) };
+    setText(this._say, again ? READY : ACTIONS[action][2]);
+  }
+
+  /** @param {Pad} pad Look for the button or the axis that is being assigned. */
+  _find(pad) {
+    if (this._assigning === null) return;
+    const { action, finder } = this._assigning;
+    const found = finder.read(pad, performance.now());
+    if (found === null) return;
+    const map = assign(this._maps.of(pad), action, found);
+    this._assigning = null;
+    if (map) this._set(map);
+    const done = map && isComplete(map) ? READY : MISSING;
+    setText(this._say, map ? done : "This button is STOP, and stays STOP.");
+  }
+
+  /** @param {Partial<import('../../web/inputs/pad_maps.js').PadMap>} change */
+  _set(change) {
+    if (this._pad) this._maps.keep(this._pad, { ...this._maps.of(this._pad), ...change });
+  }
+
+  _restore() {
+    if (!this._pad) return;
+    this._assigning = null;
+    this._maps.restore(this._pad);
+    const map = this._maps.of(this._pad);
+    this._zone.value = `${map.zone}`;
+    setText(this._say, isComplete(map) ? READY : MISSING);
+  }
+
+  /** @param {Pad} pad */
+  _show(pad) {
+    const map = this._maps.of(pad);
+    const holonomic = this._devices.active?.holonomic ?? false;
+    this._picture?.show(pad, map);
+    setText(this._share, `${Math.round(100 * map.zone)} %`);
+    const { x, y, turn } = axesOfPad(pad, map, holonomic);
+    const values = { ahead: x, side: holonomic ? y : turn, spin: turn };
+    const assigning = this._assigning?.action;
+    for (const [action, row] of this._rows) {
+      setHidden(row.element, action === "spin" && !holonomic);
+      const name = ACTIONS[action][holonomic ? 1 : 0];
+      if (action === "hold" || action === "stop") {
+        const pressed = pad.buttons[map[action] ?? -1]?.pressed === true;
+        row.show(name, buttonName(pad, map[action]), pressed ? "pressed" : "");
+      } else row.show(name, axisName(pad, map[action]), percent(values[action]));
+      row.mark(assigning === action);
+    }
+  }
+}
+
+/** One action: its name, what it is assigned to, its value, and a button. */
+class Row {
+  /** @param {() => void} change */
+  constructor(change) {
+    this._name = html("span", "");
+    this._by = html("span", "by");
+    this._value = html("span", "value");
+    this._change = button("", "Change", change);
+    const parts = [this._name, this._by, this._value, this._change];
+    this.element = html("li", "", {}, ...parts);
+  }
+
+  /**
+   * @param {string} name
+   * @param {string} by
+   * @param {string} value
+   */
+  show(name, by, value) {
+    setText(this._name, name);
+    setText(this._by, by);
+    setText(this._value, value);
+  }
+
+  /** @param {boolean} assigning */
+  mark(assigning) {
+    setText(this._change, assigning ? "Cancel" : "Change");
+    const { textContent } = this._change;
+    this._change.setAttribute("aria-label", `${textContent}: ${this._name.textContent}`);
+  }
+}
+
+/**
+ * @param {Pad} one
+ * @param {Pad} other
+ */
+function isSame(one, other) {
+  return one.index === other.index && one.id === other.id;
+}
+
+/** @param {number} value */
+function percent(value) {
+  return `${Math.round(100 * value)} %`;
+}
