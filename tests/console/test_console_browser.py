@@ -37,10 +37,13 @@ def test_a_browser_can_install_the_console_in_a_window_of_its_own(open_console, 
 
 def test_a_gamepad_without_the_standard_mapping_is_named_until_it_is_gone(open_console):
     page = open_console()
-    pad = "{index: 0, id: 'Joystick', connected: true, mapping: '', axes: [], buttons: []}"
+    known = "index: 0, id: 'Joystick', connected: true, mapping: ''"
+    pad = f"{{{known}, axes: [], buttons: []}}"
     page.evaluate(f"navigator.getGamepads = () => [{pad}]")
     notice = page.locator('.webmap-notice:has-text("Joystick")')
-    expect(notice).to_contain_text("has no standard layout and cannot drive: open Gamepad settings")
+    expect(notice).to_contain_text(
+        "has no standard layout and cannot drive: open Gamepad settings"
+    )
     expect(notice).to_have_count(1)
     page.evaluate("navigator.getGamepads = () => []")
     expect(notice).to_have_count(0)

@@ -22,18 +22,19 @@ import { Picture } from "./gamepad_picture.js";
 
 const NAME = "Gamepad settings";
 const ICON =
-  "M7.5 7h9c4 0 6 10 4 11s-4-4-5.5-4H9c-1.5 0-3.5 5-5.5 4s0-11 4-11zM8 8.5v4M6 10.5h4M16.5 10.5h.1";
-
-/** @type {readonly ButtonAction[]} */
-const BY_BUTTON = ["hold", "stop"];
+  "M7.5 7h9c4 0 6 10 4 11s-4-4-5.5-4H9c-1.5 0-3.5 5-5.5 4s0-11 4-11z" +
+  "M8 8.5v4M6 10.5h4M16.5 10.5h.1";
 
 const NOTHING = "No gamepad is connected. Connect one and press a button of the gamepad.";
-const READY = "Here no input moves a robot. The STOP of the gamepad works here too.";
+const READY = "Here no input moves a robot. STOP works, also by the gamepad, and closes this.";
 const MISSING =
   "This gamepad has no standard layout. Assign forward, turn, the button to hold, and STOP.";
 
-/** What each action does, on a base that moves sideways, and what to do to assign it.
- * @type {Readonly<Record<Action, [usual: string, sideways: string, how: string]>>} */
+/**
+ * What each action does, also on a base that moves sideways, and how it is assigned.
+ *
+ * @type {Readonly<Record<Action, [usual: string, sideways: string, how: string]>>}
+ */
 const ACTIONS = {
   ahead: ["Forward, back", "Forward, back", "Push a stick forward, then let it go."],
   side: ["Turn", "Sideways", "Push a stick to the left, then let it go."],
@@ -67,16 +68,15 @@ export class GamepadPanel {
     this._title = html("h2", "");
     this._say = html("p", "webmap-gamepad-say", { role: "status" });
     this._place = html("div", "");
-    this._rows = new Map(Object.keys(ACTIONS).map((key) => {
-      const action = /** @type {Action} */ (key);
-      return [action, new Row(() => this._assign(action))];
-    }));
+    const actions = /** @type {Action[]} */ (Object.keys(ACTIONS));
+    this._rows = new Map(actions.map((each) => [each, new Row(() => this._assign(each))]));
     const { least, most } = ZONES;
     const range = { type: "range", min: `${least}`, max: `${most}`, step: "0.01" };
     this._zone = html("input", "", range);
-    this._share = html("output", "");
+    this._share = html("span", "value");
     this._zone.addEventListener("input", () => this._set({ zone: Number(this._zone.value) }));
     const rows = [...this._rows.values()].map(({ element }) => element);
+    const zone = html("label", "", {}, "Dead zone", this._zone, this._share);
     const close = button("", "Close", () => this._dialog.close());
     const restore = button("", "Restore defaults", () => this._restore());
     this._dialog = html(
@@ -90,7 +90,7 @@ export class GamepadPanel {
         "div",
         "webmap-gamepad-parts",
         {},
-        html("div", "", {}, this._place, html("label", "", {}, "Dead zone", this._zone, this._share)),
+        html("div", "", {}, this._place, zone),
         html("div", "", {}, html("ul", "", {}, ...rows), restore),
       ),
     );
@@ -147,17 +147,24 @@ export class GamepadPanel {
       this._picture = pad ? new Picture(pad) : null;
       this._place.replaceChildren(...(this._picture ? [this._picture.element] : []));
       this._zone.value = pad ? `${this._maps.of(pad).zone}` : "";
-      setText(this._say, pad && !isComplete(this._maps.of(pad)) ? MISSING : READY);
+      if (pad) this._rest(pad);
     }
     this._pad = pad;
   }
 
   /** @param {Action} action */
   _assign(action) {
-    const again = this._assigning?.action === action;
-    const kind = BY_BUTTON.includes(/** @type {ButtonAction} */ (action)) ? "button" : "axis";
-    this._assigning = again ? null : { action, finder: new Finder(kind) };
-    setText(this._say, again ? READY : ACTIONS[action][2]);
+    if (this._assigning?.action === action) {
+      this._assigning = null;
+      if (this._pad) this._rest(this._pad);
+      return;
+    }
+    const kind = action === "hold" || action === "stop" ? "button" : "axis";
+    const finder = new Finder(kind);
+    // What is held or pushed now is not meant.
+    if (this._pad) finder.read(this._pad, performance.now());
+    this._assigning = { action, finder };
+    setText(this._say, ACTIONS[action][2]);
   }
 
   /** @param {Pad} pad Look for the button or the axis that is being assigned. */
@@ -169,8 +176,12 @@ export class GamepadPanel {
     const map = assign(this._maps.of(pad), action, found);
     this._assigning = null;
     if (map) this._set(map);
-    const done = map && isComplete(map) ? READY : MISSING;
-    setText(this._say, map ? done : "This button is STOP, and stays STOP.");
+    this._rest(pad);
+  }
+
+  /** @param {Pad} pad Show what is missing, while nothing is being assigned. */
+  _rest(pad) {
+    setText(this._say, isComplete(this._maps.of(pad)) ? READY : MISSING);
   }
 
   /** @param {Partial<import('../../web/inputs/pad_maps.js').PadMap>} change */
@@ -182,9 +193,8 @@ export class GamepadPanel {
     if (!this._pad) return;
     this._assigning = null;
     this._maps.restore(this._pad);
-    const map = this._maps.of(this._pad);
-    this._zone.value = `${map.zone}`;
-    setText(this._say, isComplete(map) ? READY : MISSING);
+    this._zone.value = `${this._maps.of(this._pad).zone}`;
+    this._rest(this._pad);
   }
 
   /** @param {Pad} pad */

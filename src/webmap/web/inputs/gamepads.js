@@ -13,7 +13,7 @@ import { PadMaps, axesOfPad, buttonName, controlsOf, isComplete, nameOf } from "
 /** A gamepad without a change for this time may be disconnected; ms. */
 export const SILENT = 2000;
 
-/** Milliseconds between two readings while there is a gamepad: a press of STOP is short. */
+/** Milliseconds between two readings for STOP and the release: a press may be short. */
 const QUICK = 15;
 
 /** Why a gamepad does nothing yet; its name is before it. */
@@ -221,7 +221,8 @@ export class Gamepads {
     this.hideHint();
   }
 
-  _read() {
+  /** @param {boolean} [quick] Whether it is only for STOP and the release of a button. */
+  _read(quick = false) {
     const holonomic = this._owner.holonomic();
     if (!attentive()) this._pads.drop();
     const axes = this._pads.read(listed(), performance.now(), { holonomic });
@@ -229,13 +230,14 @@ export class Gamepads {
     if (this._pads.stopped && (document.hasFocus() || this._drive.drives)) {
       this._owner.stopByPad();
     }
+    if (quick && axes !== null) return;
     this._drive.setInput("gamepad", this._owner.wanted() ? axes : null);
     this._show("refused", this._pads.refusal);
     this._greet(axes !== null);
     if (!this.seen) {
       clearInterval(this._timer);
       this._timer = 0;
-    } else this._timer ||= window.setInterval(() => this._read(), QUICK);
+    } else this._timer ||= window.setInterval(() => this._read(true), QUICK);
   }
 
   /** @param {boolean} drives Whether the operator drives with a gamepad, and needs no hint. */
@@ -266,7 +268,8 @@ export class Gamepads {
     const latched = isLatched(report);
     const was = this._latched.get(report.robot);
     this._latched.set(report.robot, latched);
-    if (latched && was === false && report.robot === this._drive.status.choice) vibrate();
+    const begins = latched && was === false;
+    if (begins && report.robot === this._drive.status.choice) vibrate();
   }
 
   /** A gamepad is gone; the browser's list may still contain it. */

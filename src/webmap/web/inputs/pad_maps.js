@@ -20,8 +20,11 @@ import { DEAD_ZONE, axesOfStick, beyondDeadZone } from "./sticks.js";
 /** @typedef {"ahead" | "side" | "spin"} AxisAction */
 /** @typedef {"hold" | "stop"} ButtonAction */
 
-/** An axis, and the sign of its values for forward or left: `sign` is 1 or -1.
- * @typedef {{axis: number, sign: number}} Way */
+/**
+ * An axis, and the sign of its values for forward or left, 1 or -1.
+ *
+ * @typedef {{axis: number, sign: number}} Way
+ */
 
 /**
  * @typedef {object} PadMap
@@ -74,7 +77,8 @@ export function isComplete({ ahead, side, hold, stop }) {
  * @returns {Axes}
  */
 export function axesOfPad({ axes }, { ahead, side, spin, zone }, holonomic) {
-  const value = (/** @type {Way | null} */ way) => (way ? way.sign * (axes[way.axis] ?? 0) : 0);
+  const value = (/** @type {Way | null} */ way) =>
+    way ? way.sign * (axes[way.axis] ?? 0) : 0;
   const moved = axesOfStick(-value(side), -value(ahead), { sideways: holonomic, zone });
   return holonomic ? { ...moved, turn: beyondDeadZone(value(spin), zone) } : moved;
 }
@@ -166,8 +170,8 @@ const SONY_ALL = [...SONY, "Create", "Options", ...PARTS];
 
 /** @param {Pad} pad Its name without the numbers that browsers add. */
 export function nameOf({ id }) {
-  const name = id.replace(/^[0-9a-f]{1,4}-[0-9a-f]{1,4}-/i, "").replace(/ *\([^(]*Vendor:.*$/, "");
-  return (name || id).slice(0, 80);
+  const name = id.replace(/^[0-9a-f]{1,4}-[0-9a-f]{1,4}-/i, "");
+  return (name.replace(/ *\([^(]*Vendor:.*$/, "") || id).slice(0, 80);
 }
 
 /**
