@@ -21,6 +21,8 @@ NAMES = """() => [...document.querySelectorAll("button, summary, label")].flatMa
 
 NOT_AT_REST = {
     "Acknowledge": "of an alert",
+    "Change": "of the settings of a gamepad",
+    "Dead zone": "of the settings of a gamepad",
     "Hand over": "of a request for control",
     "Keep control": "of a request for control",
     "Move": "of a label",
@@ -32,6 +34,7 @@ NOT_AT_REST = {
     "Reset all": "of a STOP of several robots",
     "Selected robot": "of a map with several robots that have layers",
     "All robots": "of a map with several robots that have layers",
+    "Restore defaults": "of the settings of a gamepad",
     "Send goal here": "of a label",
 }
 """Buttons that another state of the page shows: tests/project looks in the code."""

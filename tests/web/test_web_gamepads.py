@@ -15,6 +15,12 @@ PAD = """(mapping) => {
     navigator.getGamepads = () => [window.pad];
 }"""
 
+STOP_ON_TOP = """(() => {
+    const stop = document.querySelector('.webmap-teleop-stop');
+    const { left, top, width, height } = stop.getBoundingClientRect();
+    return document.elementFromPoint(left + width / 2, top + height / 2) === stop;
+})()"""
+
 
 def connect(bench: Bench, mapping: str = "standard") -> Locator:
     """Connect a gamepad, select a robot and return the settings of gamepads."""
@@ -65,6 +71,7 @@ def test_no_gamepad_drives_while_its_settings_are_open(open_bench) -> None:
     bench.page.evaluate("pad.buttons[4] = {pressed: true}, pad.axes[1] = -1")
     expect(row(settings, "Forward, back")).to_contain_text("100 %")
     expect(row(settings, "Hold to drive")).to_contain_text("pressed")
+    assert bench.page.evaluate(STOP_ON_TOP), "the settings cover STOP"
     bench.still(0.3)
     bench.page.keyboard.press("Escape")
     expect(settings).to_be_hidden()

@@ -94,7 +94,7 @@ export class GamepadPanel {
         html("div", "", {}, html("ul", "", {}, ...rows), restore),
       ),
     );
-    document.body.append(this._dialog);
+    this._dialog.addEventListener("close", () => this._dialog.remove());
     this._offs = [
       map.drive.on("stop", () => this._dialog.close()),
       map.drive.on("step", () => setHidden(this.go, !this._devices.pads?.seen)),
@@ -112,6 +112,7 @@ export class GamepadPanel {
     if (this._dialog.open) return;
     this._map.drive.goNeutral();
     this._devices.pads?.hideHint();
+    document.body.append(this._dialog);
     this._dialog.show();
     this._pad = null;
     this._assigning = null;
