@@ -58,7 +58,6 @@ export class GamepadPanel {
     this.go.append(svg("svg", drawing, svg("path", { d: ICON })));
     this.go.hidden = true;
     this._open = () => this.open();
-    this._devices.padSettings = this._open;
     /** @type {Pad | null} */
     this._pad = null;
     /** @type {Picture | null} */
@@ -97,7 +96,7 @@ export class GamepadPanel {
     this._dialog.addEventListener("close", () => this._dialog.remove());
     this._offs = [
       map.drive.on("stop", () => this._dialog.close()),
-      map.drive.on("step", () => setHidden(this.go, !this._devices.pads?.seen)),
+      map.drive.on("step", () => this._offer()),
     ];
   }
 
@@ -106,6 +105,12 @@ export class GamepadPanel {
     this._dialog.remove();
     this.go.remove();
     if (this._devices.padSettings === this._open) this._devices.padSettings = null;
+  }
+
+  _offer() {
+    // One map of several on the page is enough.
+    this._devices.padSettings ??= this._open;
+    setHidden(this.go, !this._devices.pads?.seen);
   }
 
   open() {
