@@ -14,6 +14,7 @@ from webmap.agents.router import (
     router_settings,
 )
 from webmap.base.errors import ConfigError
+from webmap.base.tls import TlsFiles
 from webmap.ros.names import is_agent_url, normalise_url
 
 USERS = """
@@ -147,13 +148,19 @@ def test_mistakes_in_the_file_of_users_are_named(tmp_path, text, words):
     [
         ("tcp/0.0.0.0:1", False, "can be reached from other computers"),
         ("tcp/0.0.0.0:1", True, "can be reached from other computers"),
-        ("tls/127.0.0.1:1", False, "TLS needs --certificate and --key"),
+        ("tls/127.0.0.1:1", False, "TLS needs --tls, or --tls-cert and --tls-key"),
     ],
 )
 def test_a_router_is_closed_by_default(users, listen, with_users, words):
     known = read_users(users) if with_users else None
     with pytest.raises(ConfigError, match=words):
         router_settings(listen, known)
+
+
+def test_a_router_with_a_certificate_listens_with_tls():
+    files = TlsFiles(Path("router.pem"), Path("router.key"))
+    with pytest.raises(ConfigError, match="expected tls/HOST:PORT"):
+        router_settings("tcp/127.0.0.1:1", None, files=files)
 
 
 def test_port_0_becomes_a_free_port():

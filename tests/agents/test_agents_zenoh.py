@@ -13,6 +13,7 @@ from webmap.agents.peer import Peer
 from webmap.agents.router import free_port, open_router, read_users
 from webmap.agents.router_access import RouterUser
 from webmap.base.errors import WireError
+from webmap.base.tls import TlsFiles, tls_files
 
 pytestmark = pytest.mark.slow
 
@@ -272,10 +273,19 @@ def test_peers_reach_a_router_over_tls():
     with (
         router(
             "tls/127.0.0.1:0",
-            certificate=str(TLS / "router.pem"),
-            key=str(TLS / "router.key"),
+            files=TlsFiles(TLS / "router.pem", TLS / "router.key"),
         ) as place,
         peers(place, RouterUser(ca=str(TLS / "ca.pem"))) as (peer,),
+    ):
+        assert peer.connected
+
+
+def test_peers_trust_a_router_by_the_authority_that_webmap_made(users, tmp_path):
+    find = tls_files("0.0.0.0", tmp_path, True, "", "")
+    files = find()
+    with (
+        router("tls/127.0.0.1:0", users, files=files) as place,
+        peers(place, RouterUser("west", "two", str(files.authority))) as (peer,),
     ):
         assert peer.connected
 
@@ -287,8 +297,7 @@ def test_peers_reach_a_router_over_tls():
 def test_a_router_with_a_wrong_certificate_is_refused(name, words):
     with router(
         "tls/127.0.0.1:0",
-        certificate=str(TLS / f"{name}.pem"),
-        key=str(TLS / f"{name}.key"),
+        files=TlsFiles(TLS / f"{name}.pem", TLS / f"{name}.key"),
     ) as place:
         peer = Peer(
             place, RouterUser(ca=str(TLS / "ca.pem") if name == "expired" else "")
@@ -346,11 +355,9 @@ def test_what_waits_for_a_slow_link_does_not_fill_the_memory():
 
 
 def test_a_self_signed_certificate_that_zenoh_refuses_is_no_wrong_password(users):
-    certificate = str(TLS / "self-signed.pem")
-    key = str(TLS / "self-signed.key")
-    tls = {"certificate": certificate, "key": key}
-    with router("tls/127.0.0.1:0", users, **tls) as place:
-        peer = Peer(place, RouterUser("west", "two", certificate))
+    files = TlsFiles(TLS / "self-signed.pem", TLS / "self-signed.key")
+    with router("tls/127.0.0.1:0", users, files=files) as place:
+        peer = Peer(place, RouterUser("west", "two", str(files.certificate)))
         try:
             peer.start()
             wait_for(lambda: "cannot reach the router" in (peer.trouble or ""))

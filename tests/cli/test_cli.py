@@ -85,6 +85,9 @@ def test_version_prints_the_version_of_the_package():
         (("sim", "--rosbridge", "1.0"), "rosbridge must be one of ['0.11', '2.1',"),
         (("sim", "--rosbridge", "4.1", "--dialect", "ros1"), "give only one"),
         (("demo", "--host", "0.0.0.0"), "--insecure-lan"),
+        (("demo", "--tls", "--tls-cert", "fleet.pem"), "got both"),
+        (("demo", "--tls-cert", "fleet.pem"), "got one of them"),
+        (("demo", "--tls", "--host", "robots.example.com"), "private names"),
     ],
 )
 def test_an_invalid_argument_prints_one_error_line_and_exits_with_code_2(

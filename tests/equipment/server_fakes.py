@@ -10,6 +10,7 @@ from pathlib import Path
 
 import httpx
 
+from webmap.base.tls import Renewal
 from webmap.core.operators import Viewer
 from webmap.gate.protocol import Identity
 from webmap.server.app import WebApp
@@ -149,10 +150,12 @@ def key_in(html: str) -> str:
 class Running:
     """A server that runs in a thread of its own."""
 
-    def __init__(self, app: WebApp, port: int, connections: set[object]) -> None:
+    def __init__(
+        self, app: WebApp, port: int, connections: set[object], scheme: str = "http"
+    ) -> None:
         self.connections = connections
         """The open connections of the server, HTTP and WebSocket."""
-        self.origin = f"http://127.0.0.1:{port}"
+        self.origin = f"{scheme}://127.0.0.1:{port}"
         self.port = port
         self._app = app
 
@@ -165,17 +168,18 @@ class Running:
 
 
 @contextlib.contextmanager
-def running(app: WebApp) -> Iterator[Running]:
+def running(app: WebApp, tls: Renewal | None = None) -> Iterator[Running]:
     """Serve an application on a port that the kernel chooses."""
     ready = threading.Event()
     listener = listen("127.0.0.1", 0)
     port = listener.getsockname()[1]
-    server = make_server(app, ready.set)
+    server = make_server(app, ready.set, tls)
+    scheme = "https" if tls else "http"
     thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
     thread.start()
     try:
         assert ready.wait(20)
-        yield Running(app, port, server.server_state.connections)
+        yield Running(app, port, server.server_state.connections, scheme)
     finally:
         server.should_exit = True
         thread.join(20)

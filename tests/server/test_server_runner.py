@@ -126,21 +126,23 @@ def test_a_host_that_is_not_an_address_of_this_machine_is_refused(host):
 @pytest.mark.parametrize(
     "host", ["", "0.0.0.0", "::", "192.168.1.5", "robots.example.com", "127.0.0.1.x"]
 )
-def test_serving_other_machines_needs_the_insecure_lan_option(host):
+def test_serving_other_machines_needs_tls_or_the_insecure_lan_option(host):
     with pytest.raises(ConfigError, match="insecure"):
         serve(app(), host=host, port=0)
     check_exposure(host, insecure_lan=True)
+    check_exposure(host, tls=True)
 
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "localhost", "::1", "127.9.9.9"])
 def test_serving_only_this_machine_needs_no_option(host):
-    check_exposure(host, insecure_lan=False)
+    check_exposure(host)
 
 
 def test_the_url_can_be_opened_by_a_browser_on_this_machine():
     with listen("0.0.0.0", 0) as listener:
         port = listener.getsockname()[1]
         assert url_of(listener, "0.0.0.0") == f"http://127.0.0.1:{port}/"
+        assert url_of(listener, "", tls=True) == f"https://127.0.0.1:{port}/"
         assert url_of(listener, "::1") == f"http://[::1]:{port}/"
         assert url_of(listener, "localhost") == f"http://localhost:{port}/"
 

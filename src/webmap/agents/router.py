@@ -24,6 +24,7 @@ from webmap.agents.gate_messages import MOST_SAMPLE
 from webmap.agents.peer import MOST_BYTES
 from webmap.agents.router_access import zenoh_config
 from webmap.base.errors import ConfigError
+from webmap.base.tls import TlsFiles
 
 if TYPE_CHECKING:
     import zenoh
@@ -99,8 +100,7 @@ def router_settings(
     listen: str,
     users: Mapping[str, UserEntry] | None,
     *,
-    certificate: str = "",
-    key: str = "",
+    files: TlsFiles | None = None,
     insecure_lan: bool = False,
 ) -> dict[str, Any]:
     """Return the configuration of a router.
@@ -108,8 +108,7 @@ def router_settings(
     Args:
         listen: The locator to listen on.
         users: The users; None lets everybody in.
-        certificate: The file with the certificate of the router, for TLS.
-        key: The file with its private key.
+        files: The certificate of the router, for TLS.
         insecure_lan: Whether other computers may connect without TLS or users.
 
     Raises:
@@ -119,8 +118,10 @@ def router_settings(
     """
     place = free_port(locator(listen))
     tls = place.startswith("tls/")
-    if tls and not (certificate and key):
-        raise ConfigError(f"{place}: TLS needs --certificate and --key")
+    if tls and files is None:
+        raise ConfigError(f"{place}: TLS needs --tls, or --tls-cert and --tls-key")
+    if files is not None and not tls:
+        raise ConfigError(f"{place} is without TLS: expected tls/HOST:PORT")
     if not is_loopback_locator(place) and not (tls and users) and not insecure_lan:
         raise ConfigError(
             f"{place} can be reached from other computers: use tls/ and --users, or "
@@ -131,10 +132,10 @@ def router_settings(
         "unicast": {"max_sessions": MOST_SESSIONS},
         "link": {"rx": {"max_message_size": MOST_BYTES}},
     }
-    if tls:
+    if files is not None:
         transport["link"]["tls"] = {
-            "listen_certificate": certificate,
-            "listen_private_key": key,
+            "listen_certificate": str(files.certificate),
+            "listen_private_key": str(files.key),
         }
     settings: dict[str, Any] = {
         "mode": "router",

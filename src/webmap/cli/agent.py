@@ -5,7 +5,7 @@ import sys
 import click
 
 from webmap.base.echo import echo
-from webmap.cli.options import Finite, verbose_option
+from webmap.cli.options import Finite, tls_options, verbose_option
 
 
 @click.command()
@@ -148,10 +148,8 @@ def agent(
 @click.command()
 @click.option(
     "--listen",
-    default="tcp/127.0.0.1:7447",
-    show_default=True,
     help="What to listen on: tcp/HOST:PORT, or with TLS tls/HOST:PORT; port 0 is a "
-    "free one.",
+    "free one. The default is tcp/127.0.0.1:7447, and with --tls tls/0.0.0.0:7447.",
 )
 @click.option(
     "--users",
@@ -159,16 +157,7 @@ def agent(
     help="A TOML file of users, who may be agents or reach agents. Without it, "
     "everybody who can connect may do everything.",
 )
-@click.option(
-    "--certificate",
-    type=click.Path(exists=True, dir_okay=False),
-    help="The file with the router's certificate, for TLS.",
-)
-@click.option(
-    "--key",
-    type=click.Path(exists=True, dir_okay=False),
-    help="The file with the router's private key, for TLS.",
-)
+@tls_options
 @click.option(
     "--insecure-lan",
     is_flag=True,
@@ -177,10 +166,11 @@ def agent(
 @click.option("--with-parent", is_flag=True, hidden=True)
 @verbose_option
 def router(
-    listen: str,
+    listen: str | None,
     users: str | None,
-    certificate: str | None,
-    key: str | None,
+    tls: bool,
+    tls_cert: str,
+    tls_key: str,
     insecure_lan: bool,
     with_parent: bool,
 ) -> None:
@@ -194,17 +184,26 @@ def router(
 
     from webmap.agents.address import url
     from webmap.agents.router import open_router, read_users
+    from webmap.base.tls import tls_files
+    from webmap.gate.locks import state_folder
 
     known = None if users is None else read_users(Path(users))
+    listen = listen or ("tls/0.0.0.0:7447" if tls else "tcp/127.0.0.1:7447")
+    host = listen.partition("/")[2].rpartition(":")[0]
+    find = tls_files(host, state_folder() / "tls", tls, tls_cert, tls_key)
+    certificate = find and find()
     session, place = open_router(
-        listen,
-        known,
-        certificate=certificate or "",
-        key=key or "",
-        insecure_lan=insecure_lan,
+        listen, known, files=certificate, insecure_lan=insecure_lan
     )
     try:
         echo(f"The router is ready at {url(place)}")
+        if certificate is not None and certificate.authority is not None:
+            echo(
+                "Agents and displays trust this router when WEBMAP_ROUTER_CA names a "
+                f"copy of {certificate.authority}; its SHA-256 fingerprint is "
+                f"{certificate.fingerprint}",
+                err=True,
+            )
         sys.stdout.flush()
         if with_parent:
             sys.stdin.read()

@@ -256,10 +256,7 @@ def demo(
     bridge_port: int,
     seed: int,
     dialect: str,
-    host: str,
-    port: int,
-    no_browser: bool,
-    insecure_lan: bool,
+    web: dict[str, Any],
 ) -> None:
     """Show simulated robots, to try everything without a robot.
 
@@ -273,12 +270,7 @@ def demo(
     import webmap
 
     def serve() -> None:
-        webmap.run(
-            host=host,
-            port=port,
-            open_browser=not no_browser,
-            insecure_lan=insecure_lan,
-        )
+        webmap.run(**web)
 
     if agents is not None:
         if bridge_port or robots:

@@ -1,10 +1,11 @@
 """Options of several commands."""
 
+import functools
 import logging
 import math
 import re
 from collections.abc import Callable, Sequence
-from typing import IO, Any, TypeVar
+from typing import IO, Any, TypeVar, cast
 
 import click
 
@@ -41,14 +42,49 @@ wait_option = click.option(
 """How long a command waits for a rosbridge, as an option."""
 
 
+def tls_options(command: F) -> F:
+    """Add the options of a server with TLS: its own certificate, or a given one."""
+    for option in (
+        click.option(
+            "--tls-key",
+            type=click.Path(dir_okay=False),
+            default="",
+            help="The file with the private key of --tls-cert.",
+        ),
+        click.option(
+            "--tls-cert",
+            type=click.Path(dir_okay=False),
+            default="",
+            help="Use TLS with the certificate in this file.",
+        ),
+        click.option(
+            "--tls",
+            is_flag=True,
+            help="Use TLS with a certificate that WebMap makes.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
 def web_options(command: F) -> F:
-    """Add the options of the web interface: its address and the browser."""
+    """Add the options of the web interface: its address, TLS and the browser.
+
+    The command gets them as ``web``, which are arguments of :func:`webmap.run`.
+    """
+
+    @functools.wraps(command)
+    def with_web(*args: Any, no_browser: bool, **given: Any) -> Any:
+        web = {name: given.pop(name) for name in _WEB}
+        return command(*args, web=web | {"open_browser": not no_browser}, **given)
+
     for option in (
         click.option(
             "--insecure-lan",
             is_flag=True,
             help="Allow a --host that other machines reach, without TLS.",
         ),
+        tls_options,
         click.option(
             "--host",
             default="127.0.0.1",
@@ -68,8 +104,11 @@ def web_options(command: F) -> F:
         ),
         verbose_option,
     ):
-        command = option(command)
-    return command
+        with_web = option(with_web)
+    return cast(F, with_web)
+
+
+_WEB = ("host", "port", "tls", "tls_cert", "tls_key", "insecure_lan")
 
 
 def _set_up_log(ctx: click.Context, param: click.Parameter, value: bool) -> None:

@@ -4,6 +4,7 @@ import contextlib
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -45,10 +46,7 @@ def play(
     start: float,
     loop: bool,
     bridge_port: int,
-    host: str,
-    port: int,
-    no_browser: bool,
-    insecure_lan: bool,
+    web: dict[str, Any],
 ) -> None:
     """Play a recording on the map.
 
@@ -82,12 +80,7 @@ def play(
         fleet.show(opened)
         expect_jumps(bridge, lambda: opened.robots)
         opened.add_module(RecordingPlayer, bridge, command)
-        webmap.run(
-            host=host,
-            port=port,
-            open_browser=not no_browser,
-            insecure_lan=insecure_lan,
-        )
+        webmap.run(**web)
 
 
 @contextlib.contextmanager

@@ -3,6 +3,7 @@
 import runpy
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -15,7 +16,7 @@ from webmap.cli.options import verbose_option, web_options
 @click.command(short_help="Serve your own pages, or the robots of a fleet file.")
 @click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
 @web_options
-def run(file: Path, host: str, port: int, no_browser: bool, insecure_lan: bool) -> None:
+def run(file: Path, web: dict[str, Any]) -> None:
     """Serve the pages that FILE.py makes, or the fleet that FILE.toml describes.
 
     A script makes pages with @webmap.page and may call webmap.run() itself; the
@@ -28,14 +29,10 @@ def run(file: Path, host: str, port: int, no_browser: bool, insecure_lan: bool) 
         from webmap.fleet.fleet_file import open_fleet, prepare
 
         open_fleet(prepare(file))
-        application.run(
-            host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
-        )
+        application.run(**web)
         return
     refuse_special(file)
-    application.command_line.update(
-        host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
-    )
+    application.command_line.update(**web)
     sys.path.insert(0, str(file.resolve().parent))
     sys.argv = [str(file)]
     runpy.run_path(str(file), run_name="__main__")

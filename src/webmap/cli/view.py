@@ -1,5 +1,7 @@
 """``webmap view URL``: shows the robots behind a rosbridge."""
 
+from typing import Any
+
 import click
 
 from webmap.base.echo import echo
@@ -78,10 +80,7 @@ def view(
     discover: bool,
     wait: float,
     topics: dict[str, str] | None,
-    host: str,
-    port: int,
-    no_browser: bool,
-    insecure_lan: bool,
+    web: dict[str, Any],
 ) -> None:
     """See and drive the robots behind one rosbridge or several.
 
@@ -142,6 +141,4 @@ def view(
     for each in agents:
         each.show_on(opened)
     fleet.show(opened, grid=plan is None, only_given=only_given, topics=topics)
-    webmap.run(
-        host=host, port=port, open_browser=not no_browser, insecure_lan=insecure_lan
-    )
+    webmap.run(**web)

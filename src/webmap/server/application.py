@@ -3,6 +3,7 @@
 import logging
 from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import ExitStack, asynccontextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from webmap.base.errors import ConfigError, WebMapError
@@ -111,6 +112,9 @@ def run(
     *,
     open_browser: bool = False,
     token: str | None = None,
+    tls: bool = False,
+    tls_cert: str | Path = "",
+    tls_key: str | Path = "",
     insecure_lan: bool = False,
     max_pages: int = 100,
     frame_rate: float = FRAME_RATE,
@@ -125,6 +129,12 @@ def run(
         open_browser: Whether to open the page in a browser.
         token: The secret in the printed URL; generated for each start if not given. The
             opened browser gets a one-time code instead.
+        tls: Whether to serve over TLS with a certificate that WebMap makes, signed by
+            an authority that it keeps for this user; needs the extra ``tls``.
+        tls_cert: In place of ``tls``, a file with the certificate of this server in
+            PEM, and with those between it and its authority. A renewed file is used
+            within a minute.
+        tls_key: The file with its private key in PEM, without a password.
         insecure_lan: Whether other machines may be served without TLS, so that
             everybody on the network in between can read the token.
         max_pages: The greatest number of open pages, at least 1.
@@ -132,13 +142,15 @@ def run(
             display serve more pages; ticks and commands are as fast as ever.
 
     Raises:
-        ConfigError: If it cannot listen there, or a number is not valid.
+        ConfigError: If it cannot listen there, a number is not valid, or the
+            certificate cannot be used.
 
     """
     global has_run
     has_run = True
     options: dict[str, Any] = {"host": host, "port": port}
     options |= {"open_browser": open_browser, "insecure_lan": insecure_lan}
+    options |= {"tls": tls, "tls_cert": tls_cert, "tls_key": tls_key}
     options |= command_line
     runtime.frame_rate = _checked_rate(frame_rate)
     _serve(token=token, max_pages=_checked_pages(max_pages), **options)
@@ -161,10 +173,15 @@ def _serve(
     host: str,
     port: int,
     open_browser: bool,
+    tls: bool,
+    tls_cert: str | Path,
+    tls_key: str | Path,
     insecure_lan: bool,
     token: str | None,
     max_pages: int,
 ) -> None:
+    from webmap.base.tls import Renewal, tls_files
+    from webmap.gate.locks import state_folder
     from webmap.server.access import Settings
     from webmap.server.origins import Hosts
     from webmap.server.runner import (
@@ -176,7 +193,9 @@ def _serve(
     )
 
     # Check everything that can be refused before anything starts.
-    check_exposure(host, insecure_lan=insecure_lan)
+    find = tls_files(host, state_folder() / "tls", tls, tls_cert, tls_key)
+    certificate = find and Renewal(find)
+    check_exposure(host, tls=certificate is not None, insecure_lan=insecure_lan)
     settings: dict[str, Any] = {
         "hosts": Hosts.of_binding(host),
         "max_pages": max_pages,
@@ -189,6 +208,13 @@ def _serve(
 
     def ready(url: str) -> None:
         announce(url)
+        if certificate is not None and certificate.files.authority is not None:
+            log.info(
+                "browsers trust this page after you import %s into them; its SHA-256 "
+                "fingerprint is %s",
+                certificate.files.authority,
+                certificate.files.fingerprint,
+            )
         if open_browser:
             browser.enter_context(browser_at(url.partition("?")[0], app.new_code()))
 
@@ -198,6 +224,7 @@ def _serve(
             app,
             host=host,
             port=port,
+            tls=certificate,
             insecure_lan=insecure_lan,
             listener=listener,
             on_ready=ready,

@@ -6,6 +6,7 @@ the name of a file that only its owner can read, and the file redirects to the p
 
 import asyncio
 import contextlib
+import functools
 import logging
 import os
 import socket
@@ -21,6 +22,7 @@ import uvicorn
 
 from webmap.base.errors import ConfigError, WebMapError
 from webmap.base.processes import return_large_pieces, why_not_listening
+from webmap.base.tls import Renewal
 from webmap.server.access import CODE
 from webmap.server.app import WebApp
 from webmap.server.auth import CODE_LIFE_S
@@ -43,21 +45,24 @@ _BACKLOG = 1024
 # stalled viewer's socket stays open for a quarter of an hour.
 _USER_TIMEOUT_MS = 10_000
 
+_HANDSHAKE_S = 5.0
+_RENEWAL_S = 30.0
 
-def check_exposure(host: str, *, insecure_lan: bool) -> None:
-    """Refuse to be reachable from other machines unless that was requested.
+
+def check_exposure(host: str, *, tls: bool = False, insecure_lan: bool = False) -> None:
+    """Refuse to be reachable from other machines without TLS unless that was requested.
 
     Raises:
-        ConfigError: If ``host`` is not this machine alone and ``insecure_lan`` is
-            false.
+        ConfigError: If ``host`` is not this machine alone and both are false.
 
     """
-    if not is_loopback(host) and not insecure_lan:
+    if not is_loopback(host) and not tls and not insecure_lan:
         raise ConfigError(
             f"host {host!r} can be reached from other machines, and without TLS "
-            "anyone on the network can read the token and drive the robots: keep "
-            "127.0.0.1 and put a proxy with TLS or an SSH tunnel in front, or set "
-            "insecure_lan=True (--insecure-lan) if you trust this network"
+            "anyone on the network can read the token and drive the robots: set "
+            "tls=True (--tls), or keep 127.0.0.1 and put a proxy with TLS or an SSH "
+            "tunnel in front, or set insecure_lan=True (--insecure-lan) if you trust "
+            "this network"
         )
 
 
@@ -97,11 +102,12 @@ def listen(host: str, port: int) -> socket.socket:
     return listener
 
 
-def url_of(listener: socket.socket, host: str) -> str:
+def url_of(listener: socket.socket, host: str, *, tls: bool = False) -> str:
     """Return the URL of a listening socket for a browser on this machine."""
     name = "127.0.0.1" if host in WILDCARD else host
     bracketed = f"[{name}]" if ":" in name else name
-    return f"http://{bracketed}:{listener.getsockname()[1]}/"
+    scheme = "https" if tls else "http"
+    return f"{scheme}://{bracketed}:{listener.getsockname()[1]}/"
 
 
 def announce(url: str) -> None:
@@ -114,6 +120,7 @@ def serve(
     *,
     host: str = "127.0.0.1",
     port: int = 8000,
+    tls: Renewal | None = None,
     insecure_lan: bool = False,
     listener: socket.socket | None = None,
     on_ready: Callable[[str], object] = announce,
@@ -124,7 +131,8 @@ def serve(
         app: The web application.
         host: The address to listen on.
         port: The port; 0 lets the kernel choose.
-        insecure_lan: Without it only this machine is served.
+        tls: The certificate; without one the page is served over plain HTTP.
+        insecure_lan: Without it only this machine is served over plain HTTP.
         listener: A socket from :func:`listen` that was opened before, so that nothing
             starts if the port is in use; closed here.
         on_ready: Called once with the URL when the page can be opened.
@@ -134,13 +142,13 @@ def serve(
         WebMapError: If the application's own start failed; the log has the reason.
 
     """
-    check_exposure(host, insecure_lan=insecure_lan)
+    check_exposure(host, tls=tls is not None, insecure_lan=insecure_lan)
     return_large_pieces()
     listener = listener or listen(host, port)
-    url = url_of(listener, host)
+    url = url_of(listener, host, tls=tls is not None)
     if not app.settings.authenticate:
         url += f"?token={app.settings.token}"
-    server = make_server(app, lambda: on_ready(url))
+    server = make_server(app, lambda: on_ready(url), tls)
     try:
         server.run(sockets=[listener])
     except SystemExit as error:
@@ -151,7 +159,9 @@ def serve(
         raise server.failure
 
 
-def make_server(app: WebApp, on_ready: Callable[[], object]) -> "Server":
+def make_server(
+    app: WebApp, on_ready: Callable[[], object], tls: Renewal | None = None
+) -> "Server":
     """Return the server of :func:`serve`, for callers that run it themselves."""
     http, ws = protocols()
     config = uvicorn.Config(
@@ -173,23 +183,34 @@ def make_server(app: WebApp, on_ready: Callable[[], object]) -> "Server":
         log_level=logging.WARNING,
         backlog=_ACCEPTED_AT_ONCE,
         timeout_graceful_shutdown=1,
+        ssl_context_factory=None if tls is None else lambda *_: tls.context,
     )
-    return Server(config, on_ready)
+    return Server(config, on_ready, tls)
 
 
 class Server(uvicorn.Server):
     """A server with a callback when it is ready, which a signal ends."""
 
-    def __init__(self, config: uvicorn.Config, on_ready: Callable[[], object]) -> None:
+    def __init__(
+        self,
+        config: uvicorn.Config,
+        on_ready: Callable[[], object],
+        tls: Renewal | None = None,
+    ) -> None:
         super().__init__(config)
         self._on_ready = on_ready
+        self._tls = tls
         self.failure: Exception | None = None
         self._reading: asyncio.Task[str] | None = None
+        self._renewing: asyncio.Task[None] | None = None
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Start to listen, then call the callback."""
         # The first page does not wait for it.
         self._reading = asyncio.create_task(asyncio.to_thread(own_files.version))
+        if self._tls is not None:
+            self._renewing = asyncio.create_task(_renew(self._tls))
+            _limit_handshakes(asyncio.get_running_loop())
         await super().startup(sockets)
         for listener in sockets or ():
             listener.listen(_BACKLOG)
@@ -206,6 +227,28 @@ class Server(uvicorn.Server):
         del sig, frame
         self.force_exit = self.should_exit
         self.should_exit = True
+
+
+def _limit_handshakes(loop: asyncio.AbstractEventLoop) -> None:
+    """Let clients begin TLS within a few seconds; asyncio's own limit is a minute."""
+    # uvicorn has no option for it.
+    create = functools.partial(loop.create_server, ssl_handshake_timeout=_HANDSHAKE_S)
+    loop.create_server = create  # type: ignore[method-assign]
+
+
+async def _renew(tls: Renewal) -> None:
+    """Use a renewed certificate soon after it was written."""
+    trouble = ""
+    while True:
+        await asyncio.sleep(_RENEWAL_S)
+        try:
+            if await asyncio.to_thread(tls.look):
+                log.info("TLS: %s was read again", tls.files.certificate)
+            trouble = ""
+        except (ConfigError, OSError) as error:
+            if str(error) != trouble:
+                trouble = str(error)
+                log.error("TLS: %s; the old certificate stays in use", trouble)
 
 
 _HTML = """<!doctype html>
