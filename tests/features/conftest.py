@@ -24,7 +24,7 @@ def channel() -> Channel:
 @pytest.fixture
 def page(channel, tmp_path) -> Iterator[Page]:
     entry = PageEntry("/", lambda page: None, None, tmp_path, "test")
-    page = Page(entry, channel, Viewer("v1", "Ann"), None, {})
+    page = Page(entry, channel, Viewer("v1", "Ann", "admin"), None, {})
     yield page
     page.close()
 

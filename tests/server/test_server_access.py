@@ -266,7 +266,7 @@ def test_the_cookie_identifies_the_viewer(access):
     cookie = cookie_of(sign_in(access))
     got = access.identify(RequestHead.of(scope(cookie=[f"a=b; {cookie}; c=d"])), 0.0)
     assert isinstance(got, Viewer)
-    assert got.role == "operator"
+    assert got.role == "admin"
     again = access.identify(RequestHead.of(scope(cookie=["x=y", cookie])), 9.0)
     assert again == got
 

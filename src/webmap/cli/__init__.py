@@ -26,6 +26,7 @@ COMMANDS = {
     "router": "webmap.cli.agent:router",
     "run": "webmap.cli.run:run",
     "sim": "webmap.cli.sim:sim",
+    "user": "webmap.cli.user:user",
     "view": "webmap.cli.view:view",
 }
 

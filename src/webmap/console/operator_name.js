@@ -1,9 +1,10 @@
+import { signOut } from "../web/access.js";
 import { byId, button, html, setText, svg } from "../web/tools/elements.js";
 
 /** @typedef {{name: string, place: string}} Stated */
 /**
- * @typedef {Stated & {address: string, number: number, verified: boolean, label: string}}
- *     Operator
+ * @typedef {Stated & {address: string, number: number, verified: boolean, label: string,
+ *     role: string, signsOut: boolean}} Operator
  */
 
 /** Where the browser keeps what the person stated, for all pages. */
@@ -13,6 +14,13 @@ const KEPT = "webmap operator";
 const LONGEST = "200";
 
 const SEEN = "Others see this name when you drive or press STOP.";
+
+/** What a person who has signed in with a name may do, by role. */
+const MAY = {
+  viewer: "You may look, and press STOP. An operator can drive.",
+  operator: "You may drive and send robots.",
+  admin: "You may drive and send robots, and align their maps.",
+};
 
 /**
  * The name of the person at this page, in the bar. Until the person has answered, the
@@ -53,14 +61,20 @@ class OperatorName {
     this._save = button("", "Save", () => {});
     this._save.type = "submit";
     this._told = html("p", "word", { role: "status" }, SEEN);
+    this._out = button("", "Sign out", () => void this._signOut());
+    this._out.hidden = true;
+    this._fields = [
+      html("label", "", {}, "Your name on this page", this._name),
+      html("label", "", {}, "Place, such as room 2", this._place),
+      this._save,
+    ];
     const form = html(
       "form",
       "bridge-list message-form",
       {},
-      html("label", "", {}, "Your name on this page", this._name),
-      html("label", "", {}, "Place, such as room 2", this._place),
-      this._save,
+      ...this._fields,
       this._told,
+      this._out,
     );
     form.addEventListener("submit", (event) => {
       event.preventDefault();
@@ -93,7 +107,7 @@ class OperatorName {
   }
 
   /** @param {Operator} operator */
-  _show({ name, place, address, number, verified, label }) {
+  _show({ name, place, address, number, verified, label, role, signsOut }) {
     const asks = !name && this._stated === null;
     this.element.classList.toggle("asking", asks);
     const none = asks ? "Name?" : "No name";
@@ -102,7 +116,15 @@ class OperatorName {
     this._name.value = name;
     this._place.value = place;
     this._place.placeholder = address;
-    for (const each of [this._name, this._place, this._save]) each.disabled = verified;
+    for (const each of this._fields) each.hidden = verified;
+    if (verified) setText(this._told, MAY[/** @type {keyof typeof MAY} */ (role)] ?? "");
+    this._out.hidden = !signsOut;
+  }
+
+  async _signOut() {
+    const failed = await signOut();
+    if (failed) setText(this._told, failed);
+    else location.reload();
   }
 
   /** @param {Operator} operator */

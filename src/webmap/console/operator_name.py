@@ -35,7 +35,12 @@ class OperatorName:
         operator = self.map.page.viewer.operator
         if operator != self._shown:
             self._shown = operator
-            self.browser_part.send({**asdict(operator), "label": str(operator)})
+            viewer = self.map.page.viewer
+            self.browser_part.send(
+                asdict(operator)
+                | {"label": str(operator), "role": viewer.role}
+                | {"signsOut": viewer.signs_out}
+            )
 
     def on_message(self, message: dict[str, Any]) -> None:
         """Set the name that the page states."""

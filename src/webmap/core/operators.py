@@ -96,6 +96,9 @@ class Viewer:
     role: Role = "operator"
     """What the viewer may do: watch, drive, or administer."""
 
+    signs_out: bool = False
+    """Whether WebMap has a session of this viewer that the page can end."""
+
     @property
     def operator(self) -> Operator:
         """Who this viewer is for other people now."""

@@ -14,6 +14,7 @@ from starlette.responses import HTMLResponse, RedirectResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import Receive, Scope, Send
 
+from webmap.base.errors import ConfigError
 from webmap.core.base_page import PageEntry
 from webmap.core.page import Site
 from webmap.server.access import Settings
@@ -32,10 +33,13 @@ from webmap.server.html import FOLDER, base_of, make_page, prepare_page
 from webmap.server.open_pages import OpenPages
 from webmap.server.outbox import BatchedCallsByLoop
 from webmap.server.own_files import own_files
-from webmap.server.security import PAGE_KEY, SANDBOX, Security, plain
+from webmap.server.security import PAGE_KEY, SANDBOX, VIEWER, Security, plain
 from webmap.server.sockets import ConnectToGate, DriveSockets, SceneSockets, find_page
 
 log = logging.getLogger("webmap.server")
+
+_PEOPLE_S = 0.4
+"""Seconds after which changes of users and sessions take effect."""
 
 Lifespan = Callable[[Starlette], AbstractAsyncContextManager[None]]
 
@@ -71,12 +75,16 @@ class WebApp:
         self.published = published or Published()
         self._gzip = GzipCache()
         calls = BatchedCallsByLoop()
-        scene = SceneSockets(site, pages, calls, settings.max_pages)
-        drive = DriveSockets(pages, connect_to_gate, calls, settings.max_pages)
+        self._sockets = (
+            SceneSockets(site, pages, calls, settings.max_pages),
+            DriveSockets(pages, connect_to_gate, calls, settings.max_pages),
+        )
+        scene, drive = self._sockets
         self.routes = [
             WebSocketRoute("/_webmap/scene", scene.serve),
             WebSocketRoute("/_webmap/drive", drive.serve),
             Route("/_webmap/key", _key_fits, methods=["POST"]),
+            Route("/_webmap/sign-out", self._sign_out, methods=["POST"]),
             Route(FILES + "{name:path}", self._published_file),
             Route(IMAGES + "{tag}", self._published_image),
             Route("/_webmap/{name:path}", self._static),
@@ -98,6 +106,33 @@ class WebApp:
     def new_code(self) -> str:
         """Return a one-time code; a URL with ``?webmap_code=`` signs in once."""
         return self._security.new_code()
+
+    async def watch_people(self) -> None:
+        """End the sockets of people whose session has ended, soon after that."""
+        people, trouble = self.settings.people, ""
+        while people is not None:
+            try:
+                await asyncio.to_thread(people.refresh)
+                trouble = ""
+            except (ConfigError, OSError) as error:
+                if str(error) != trouble:
+                    trouble = str(error)
+                    log.error("the users stay as they were: %s", trouble)
+            self._end_sockets()
+            await asyncio.sleep(_PEOPLE_S)
+
+    def _end_sockets(self) -> None:
+        if self.settings.people is not None:
+            for sockets in self._sockets:
+                sockets.end_unless(self.settings.people.viewer)
+
+    async def _sign_out(self, request: Request) -> Response:
+        if self.settings.people is not None:
+            viewer = request.scope[VIEWER]
+            log.info("%s signed out", viewer.operator.logged)
+            await asyncio.to_thread(self.settings.people.end, viewer.id)
+            self._end_sockets()
+        return Response(status_code=204)
 
     async def _static(self, request: Request) -> Response:
         name = request.path_params["name"]

@@ -128,7 +128,8 @@ def run(
         port: The port; 0 lets the system choose.
         open_browser: Whether to open the page in a browser.
         token: The secret in the printed URL; generated for each start if not given. The
-            opened browser gets a one-time code instead.
+            opened browser gets a one-time code instead. Named users (``webmap user
+            add``) sign in with their passwords, and there is no token.
         tls: Whether to serve over TLS with a certificate that WebMap makes, signed by
             an authority that it keeps for this user; needs the extra ``tls``.
         tls_cert: In place of ``tls``, a file with the certificate of this server in
@@ -184,6 +185,7 @@ def _serve(
     from webmap.gate.locks import state_folder
     from webmap.server.access import Settings
     from webmap.server.origins import Hosts
+    from webmap.server.people import People, UserFile
     from webmap.server.runner import (
         announce,
         browser_at,
@@ -200,6 +202,9 @@ def _serve(
         "hosts": Hosts.of_binding(host),
         "max_pages": max_pages,
     }
+    if UserFile(state_folder()).read():
+        people = settings["people"] = People(state_folder())
+        token = people.secret
     if token is not None:
         settings["token"] = token
     app = _make_app(Settings(**settings), with_lifespan=False)
@@ -216,7 +221,8 @@ def _serve(
                 certificate.files.fingerprint,
             )
         if open_browser:
-            browser.enter_context(browser_at(url.partition("?")[0], app.new_code()))
+            code = "" if app.settings.people else app.new_code()
+            browser.enter_context(browser_at(url.partition("?")[0], code))
 
     try:
         runtime.start()

@@ -62,9 +62,9 @@ class Token:
         digest = hashlib.sha256(offered.encode(errors="replace")).digest()
         return hmac.compare_digest(digest, self._digest)
 
-    def issue(self) -> str:
-        """Return the cookie value of a new session."""
-        return _signed(self._cookie_secret, secrets.token_urlsafe(16))
+    def issue(self, session: str | None = None) -> str:
+        """Return the cookie value of a session, of a new one if none is given."""
+        return _signed(self._cookie_secret, session or secrets.token_urlsafe(16))
 
     def session(self, cookie: str) -> str | None:
         """Return the session of a valid cookie value, or None."""
@@ -106,19 +106,31 @@ class Codes:
     def __init__(self, life: float = CODE_LIFE_S, limit: int = 64) -> None:
         self._life = life
         self._limit = limit
-        self._ends: OrderedDict[str, float] = OrderedDict()
+        self._codes: OrderedDict[str, tuple[float, str]] = OrderedDict()
 
-    def issue(self, now: float) -> str:
-        """Return a new code, valid from ``now``, in seconds of any clock."""
+    def issue(self, now: float, session: str | None = None) -> str:
+        """Return a new code, valid from ``now``, in seconds of any clock.
+
+        Args:
+            now: Seconds of any clock.
+            session: The session that the code signs in; a new one if not given.
+
+        """
         code = secrets.token_urlsafe(16)
-        self._ends[code] = now + self._life
-        if len(self._ends) > self._limit:
-            self._ends.popitem(last=False)
+        self._codes[code] = now + self._life, session or secrets.token_urlsafe(16)
+        if len(self._codes) > self._limit:
+            self._codes.popitem(last=False)
         return code
 
-    def use(self, code: str, now: float) -> bool:
-        """Use up a code; return False if it was used before, too old, or unknown."""
-        return now < self._ends.pop(code, now)
+    def use(self, code: str, now: float) -> str | None:
+        """Use up a code, and return its session.
+
+        Returns:
+            None if it was used before, is too old, or unknown.
+
+        """
+        end, session = self._codes.pop(code, (now, ""))
+        return session if now < end else None
 
 
 class Attempts:

@@ -393,6 +393,17 @@ class OpenSockets:
         if self._sockets:
             self.end(next(iter(self._sockets)), reason)
 
+    def end_unless(self, lasts: Callable[[str], object], reason: str) -> None:
+        """Close the sockets of the viewers whose session has ended.
+
+        Args:
+            lasts: Called with the id of each viewer.
+            reason: Why the sockets are closed.
+
+        """
+        for key in [key for key in self._sockets if not lasts(key[0])]:
+            self.end(key, reason)
+
     def remove(self, key: Key, socket: PageSocket) -> None:
         """Remove a page's socket, unless another one has replaced it."""
         if self._sockets.get(key) is socket:

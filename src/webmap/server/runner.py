@@ -13,10 +13,11 @@ import socket
 import tempfile
 import threading
 import webbrowser
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Coroutine, Iterator
 from html import escape
 from pathlib import Path
 from types import FrameType
+from typing import Any
 
 import uvicorn
 
@@ -146,7 +147,7 @@ def serve(
     return_large_pieces()
     listener = listener or listen(host, port)
     url = url_of(listener, host, tls=tls is not None)
-    if not app.settings.authenticate:
+    if not app.settings.authenticate and not app.settings.people:
         url += f"?token={app.settings.token}"
     server = make_server(app, lambda: on_ready(url), tls)
     try:
@@ -185,7 +186,7 @@ def make_server(
         timeout_graceful_shutdown=1,
         ssl_context_factory=None if tls is None else lambda *_: tls.context,
     )
-    return Server(config, on_ready, tls)
+    return Server(config, on_ready, app.watch_people, tls)
 
 
 class Server(uvicorn.Server):
@@ -195,21 +196,24 @@ class Server(uvicorn.Server):
         self,
         config: uvicorn.Config,
         on_ready: Callable[[], object],
+        watch_people: Callable[[], Coroutine[Any, Any, None]],
         tls: Renewal | None = None,
     ) -> None:
         super().__init__(config)
         self._on_ready = on_ready
+        self._watch_people = watch_people
         self._tls = tls
         self.failure: Exception | None = None
         self._reading: asyncio.Task[str] | None = None
-        self._renewing: asyncio.Task[None] | None = None
+        self._tasks: list[asyncio.Task[None]] = []
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Start to listen, then call the callback."""
         # The first page does not wait for it.
         self._reading = asyncio.create_task(asyncio.to_thread(own_files.version))
+        self._tasks.append(asyncio.create_task(self._watch_people()))
         if self._tls is not None:
-            self._renewing = asyncio.create_task(_renew(self._tls))
+            self._tasks.append(asyncio.create_task(_renew(self._tls)))
             _limit_handshakes(asyncio.get_running_loop())
         await super().startup(sockets)
         for listener in sockets or ():
@@ -270,10 +274,11 @@ def browser_at(url: str, code: str) -> Iterator[None]:
 
     Args:
         url: The URL of the page, without a query.
-        code: A one-time code that signs in.
+        code: A one-time code that signs in; empty if people sign in by themselves.
 
     """
-    file = _write(_HTML.format(url=escape(f"{url}?{CODE}={code}")))
+    address = f"{url}?{CODE}={code}" if code else url
+    file = _write(_HTML.format(url=escape(address)))
     if file is None:
         logging.getLogger("webmap").warning(
             "no browser is opened, as no file can be written in the home folder or in "

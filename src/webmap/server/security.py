@@ -3,6 +3,7 @@
 Before a visitor has signed in, the only page is the one that asks for the token.
 """
 
+import asyncio
 import base64
 import contextlib
 import hashlib
@@ -12,6 +13,7 @@ import time
 from collections.abc import Callable
 from html import escape
 from http import HTTPStatus
+from urllib.parse import parse_qsl
 
 from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -27,6 +29,7 @@ from webmap.server.access import (
     redact,
 )
 from webmap.server.connections import connection_of
+from webmap.server.html import FOLDER, base_of
 
 log = logging.getLogger("webmap.server")
 
@@ -85,11 +88,21 @@ def plain(status: int, text: str) -> Response:
     return PlainTextResponse(f"{status} {phrase}\n\n{text}\n", status)
 
 
-def refuse(refusal: AccessRefusal, *, wants_html: bool) -> Response:
-    """Return the answer to a refused request."""
-    if refusal.status == HTTPStatus.UNAUTHORIZED and wants_html:
-        return sign_in_page(refusal.text, refusal.status)
-    response = plain(refusal.status, refusal.text)
+def refuse(
+    refusal: AccessRefusal, *, wants_html: bool, form: str | None = None
+) -> Response:
+    """Return the answer to a refused request.
+
+    Args:
+        refusal: Why it is refused.
+        wants_html: Whether a person sees the answer.
+        form: The form of the sign-in of named users; None for that of the token.
+
+    """
+    if wants_html and (refusal.status == HTTPStatus.UNAUTHORIZED or form):
+        response: Response = sign_in_page(refusal.text, refusal.status, form)
+    else:
+        response = plain(refusal.status, refusal.text)
     if refusal.retry_after:
         response.headers["retry-after"] = str(refusal.retry_after)
     return response
@@ -120,6 +133,7 @@ class Security:
     ) -> None:
         self._app = app
         self._authenticate = settings.authenticate
+        self._named = settings.people is not None
         self._access = AccessControl(settings)
         self._now = now
 
@@ -131,7 +145,7 @@ class Security:
         request = RequestHead.of(scope)
         if self._authenticate is None:
             redact(scope)
-        who = await self._who(request, scope)
+        who = await self._who(request, scope, receive)
         if isinstance(who, SignedIn):
             scope[PAGE_KEY] = who.key
             send = with_headers(send, who.cookie)
@@ -147,7 +161,8 @@ class Security:
             await redirect(who)(scope, receive, send)
         else:
             _log_refusal(who, request, scope)
-            answer = refuse(who, wants_html=request.wants_html)
+            form = self._form(request, scope) if self._named else None
+            answer = refuse(who, wants_html=request.wants_html, form=form)
             if connection_of(scope):
                 # One request per connection, so that clients who have not signed in
                 # cannot keep the server busy with all of theirs at once.
@@ -159,17 +174,53 @@ class Security:
         return self._access.codes.issue(self._now())
 
     async def _who(
-        self, request: RequestHead, scope: Scope
+        self, request: RequestHead, scope: Scope, receive: Receive
     ) -> Viewer | Redirect | SignedIn | AccessRefusal:
         refusal = self._access.check_address(request)
         if refusal is not None:
             return refusal
+        if self._named and _is_sign_in(request, scope):
+            name, password, path = await _typed(receive)
+            return await asyncio.to_thread(
+                self._access.sign_in_user, request, name, password, path, self._now()
+            )
         if self._authenticate is None:
             return self._access.identify(request, self._now())
         viewer = self._authenticate(scope)
         if inspect.isawaitable(viewer):
             viewer = await viewer
         return viewer or AccessRefusal(403, "Your account has no access to WebMap.")
+
+    def _form(self, request: RequestHead, scope: Scope) -> str:
+        path = "" if _is_sign_in(request, scope) else request.path
+        return _ASK_NAME.format(
+            action=escape(f"{base_of(request.root)}{SIGN_IN}"), path=escape(path)
+        )
+
+
+SIGN_IN = "sign-in"
+"""The route of the sign-in of named users, below WebMap's own folder."""
+
+_LONGEST_FORM = 8192
+
+
+def _is_sign_in(request: RequestHead, scope: Scope) -> bool:
+    ours = request.path.removeprefix(request.root) == f"{FOLDER}{SIGN_IN}"
+    return ours and scope.get("method") == "POST"
+
+
+async def _typed(receive: Receive) -> tuple[str, str, str]:
+    """Return name, password and path of a form; empty ones if it is too long."""
+    data = b""
+    while len(data) <= _LONGEST_FORM:
+        message = await receive()
+        data += message.get("body", b"")
+        if not message.get("more_body"):
+            break
+    if len(data) > _LONGEST_FORM:
+        data = b""
+    fields = dict(parse_qsl(data.decode("latin-1"), max_num_fields=8))
+    return fields.get("name", ""), fields.get("password", ""), fields.get("path", "")
 
 
 async def _deny(answer: Response, scope: Scope, receive: Receive, send: Send) -> None:
@@ -226,6 +277,7 @@ h1 { margin: 0.75rem 0 0.25rem; font-size: 1.375rem; }
 p { margin: 0 0 1rem; color: var(--muted); }
 .why { color: var(--text); font-weight: 600; }
 label { display: block; margin-bottom: 0.25rem; font-weight: 600; }
+input + label { margin-top: 0.75rem; }
 input, button {
   width: 100%; min-height: 2.75rem; border-radius: 0.5rem; font: inherit;
 }
@@ -254,16 +306,29 @@ _PAGE = """<!doctype html>
 <path d="M16 6.5l8.5 18L16 20l-8.5 4.5z"/></svg>
 <h1>Sign in to WebMap</h1>
 <p class="why" role="status">{text}</p>
-<p>Open the address that WebMap printed at its start, or enter its token:</p>
-<form>
-<label for="token">Token</label>
-<input name="token" id="token" type="password" autocomplete="off" required autofocus>
-<button>Sign in</button>
-</form>
+{form}
 <p>If you have just signed in through another site, <a href="?">continue</a>.</p>
 </main>
 </html>
 """
+
+_ASK_TOKEN = """<p>Open the address that WebMap printed at its start, or enter its
+token:</p>
+<form>
+<label for="token">Token</label>
+<input name="token" id="token" type="password" autocomplete="off" required autofocus>
+<button>Sign in</button>
+</form>"""  # noqa: S105 - a form
+
+_ASK_NAME = """<form method="post" action="{action}">
+<input type="hidden" name="path" value="{path}">
+<label for="name">Name</label>
+<input name="name" id="name" autocomplete="username" maxlength="100" required autofocus>
+<label for="password">Password</label>
+<input name="password" id="password" type="password" autocomplete="current-password"
+ maxlength="256" required>
+<button>Sign in</button>
+</form>"""
 
 _HASH = base64.b64encode(hashlib.sha256(_STYLE.encode()).digest()).decode()
 
@@ -274,12 +339,17 @@ _POLICY = (
 """This page has its style in it, and needs nothing else."""
 
 
-def sign_in_page(text: str, status: int) -> HTMLResponse:
-    """Return the page that asks for the token.
+def sign_in_page(text: str, status: int, form: str | None = None) -> HTMLResponse:
+    """Return the page that asks for the token, or for a name and a password.
 
     Args:
         text: Why the request was refused.
         status: The HTTP status of the refusal.
+        form: The form, if it is not that of the token.
     """
-    page = _PAGE.format(style=_STYLE, text=escape(text))
-    return HTMLResponse(page, status, {"content-security-policy": _POLICY})
+    page = _PAGE.format(style=_STYLE, text=escape(text), form=form or _ASK_TOKEN)
+    headers = {"content-security-policy": _POLICY}
+    if form is not None:
+        # Without a referrer a browser sends a form with the origin "null".
+        headers["referrer-policy"] = "same-origin"
+    return HTMLResponse(page, status, headers)

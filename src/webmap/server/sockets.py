@@ -48,6 +48,9 @@ from webmap.server.security import VIEWER
 log = logging.getLogger("webmap.server")
 
 
+SIGNED_OUT = "you are not signed in any more"
+
+
 def find_page(site: Site, path: str) -> PageEntry | None:
     """Return the page at a path, with or without the slash at its start."""
     return site.pages.get("/" + path.removeprefix("/"))
@@ -83,6 +86,10 @@ class SceneSockets:
         self._calls = calls
         self._open = OpenSockets(limit)
         self._opens = Opens(limit)
+
+    def end_unless(self, lasts: Callable[[str], object]) -> None:
+        """Close the sockets of the viewers whose session has ended."""
+        self._open.end_unless(lasts, SIGNED_OUT)
 
     async def serve(self, socket: WebSocket) -> None:
         """Serve one socket until it ends."""
@@ -168,6 +175,11 @@ class DriveSockets:
         self._calls = calls
         self._open = OpenSockets(limit)
         self._stop_only = OpenSockets(MOST_STOP_ONLY, always=True)
+
+    def end_unless(self, lasts: Callable[[str], object]) -> None:
+        """Close the sockets of the viewers whose session has ended: robots stop."""
+        self._open.end_unless(lasts, SIGNED_OUT)
+        self._stop_only.end_unless(lasts, SIGNED_OUT)
 
     async def serve(self, socket: WebSocket) -> None:
         """Serve one socket until it ends."""

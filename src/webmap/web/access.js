@@ -101,13 +101,32 @@ export function protocols() {
  */
 export async function whyRefused() {
   try {
-    const headers = key() ? { [KEY]: key() } : undefined;
-    const answer = await fetch(new URL("key", BASE), { method: "POST", headers });
+    const answer = await post("key");
     if (![401, 403, 421].includes(answer.status)) return "";
     return (await answer.text()).split("\n\n")[1]?.trim() ?? "";
   } catch {
     return ""; // There is no server.
   }
+}
+
+/**
+ * End this browser's session, on all its pages; robots that they drive stop.
+ *
+ * @returns {Promise<string>} Why that failed; empty if it did not.
+ */
+export async function signOut() {
+  try {
+    const answer = await post("sign-out");
+    return answer.ok ? "" : `You are still signed in: the server answered ${answer.status}.`;
+  } catch {
+    return "You are still signed in: the server does not answer.";
+  }
+}
+
+/** @param {string} path Below {@link BASE}. */
+function post(path) {
+  const headers = key() ? { [KEY]: key() } : undefined;
+  return fetch(new URL(path, BASE), { method: "POST", headers });
 }
 
 /**

@@ -175,9 +175,9 @@ def test_a_viewer_cannot_align_robots(tmp_path, robot, channel, store):
     map.add_robot(robot)
     tool = map.add_module("AlignTool")
     tool.on_message({"begin": robot.id})
-    assert answer(channel, "refused") == "Only operators can align maps."
+    assert answer(channel, "refused") == "Only admins can align maps."
     save(tool, robot)
-    assert answer(channel, "refused") == "Only operators can align maps."
+    assert answer(channel, "refused") == "Only admins can align maps."
     assert robot.pose_source.own_alignment is None
     page.close()
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger("webmap.modules.align_tool")
 
-MAY_ALIGN = ("operator", "admin")
+MAY_ALIGN = ("admin",)
 
 MOVING = ("driving", "stopping")
 """The states of a robot in which its alignment cannot change."""
@@ -124,7 +124,7 @@ class AlignTool:
     def _why_refused(self, robot: "Robot | None", *, whole: bool = False) -> str | None:
         """Return why a robot cannot be aligned from this page now, None if it can."""
         if self.map.page.viewer.role not in MAY_ALIGN:
-            return "Only operators can align maps."
+            return "Only admins can align maps."
         if robot is None:
             return "Select a robot first."
         if robot.pose_source.bridge is None:

@@ -82,7 +82,8 @@ class Trail:
 
     def on_odometry_update(self) -> None:
         """Extend the trail to the robot's position."""
-        last, at = self._last, (self.robot.position.x, self.robot.position.y)
+        position = self.robot.position
+        last, at = self._last, (position.x, position.y)
         far = math.inf if last is None else math.dist(last, at)
         if far < self.step:
             return
