@@ -96,11 +96,16 @@ def channel() -> Channel:
 
 
 @pytest.fixture
-def page(channel: Channel, publisher: Publisher, tmp_path: Path) -> Page:
+def make_page(channel: Channel, publisher: Publisher, tmp_path: Path):
+    """Make the page of a viewer."""
     entry = PageEntry("/", lambda page: None, None, tmp_path, "test")
-    return Page(
-        entry, channel, Viewer("v1", "Ann"), publisher, {"webmap_container": (700, 500)}
-    )
+    sizes = {"webmap_container": (700, 500)}
+    return lambda viewer: Page(entry, channel, viewer, publisher, sizes)
+
+
+@pytest.fixture
+def page(make_page) -> Page:
+    return make_page(Viewer("v1", "Ann"))
 
 
 @pytest.fixture

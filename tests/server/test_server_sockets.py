@@ -140,7 +140,7 @@ def test_a_drive_socket_carries_messages_both_ways_and_reports_its_close(
 
     asyncio.run(scenario())
     connection = rooms.gate.connections[0]
-    assert connection.role == "operator"
+    assert connection.role == "admin"
     assert connection.received == ['{"op":"take","robot":"r1"}']
     wait_for(lambda: len(rooms.model.drives) == 2)
     assert connection.times_closed == 1

@@ -30,6 +30,7 @@ from webmap.agents.gate_messages import (
     head_of,
 )
 from webmap.base.errors import WireError
+from webmap.base.roles import Role
 from webmap.gate.commands import ControlCommand, Refusal, Stop, check, stop_in
 from webmap.gate.lanes.budget import BYTES, FRAMES, Budget
 from webmap.gate.protocol import (
@@ -44,7 +45,6 @@ from webmap.gate.protocol import (
     Rename,
     RobotGone,
     RobotReport,
-    Role,
     Speeds,
     Tick,
     ToGate,

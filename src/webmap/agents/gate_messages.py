@@ -14,13 +14,8 @@ from typing import Annotated
 import msgspec
 
 from webmap.base.errors import WireError
-from webmap.gate.protocol import (
-    FromGate,
-    FromPage,
-    FromProgram,
-    RobotReport,
-    Role,
-)
+from webmap.base.roles import Role
+from webmap.gate.protocol import FromGate, FromPage, FromProgram, RobotReport
 
 _head = struct.Struct("<QQ")
 

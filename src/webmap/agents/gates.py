@@ -18,18 +18,12 @@ from webmap.agents.peer import Peer, peer_of
 from webmap.agents.remote_gate import RemoteGate
 from webmap.base.errors import ConfigError, WireError
 from webmap.base.geometry import Twist
+from webmap.base.roles import Role
 from webmap.base.scope import Removal
 from webmap.gate import protocol
 from webmap.gate.commands import Stop, robot_in, stop_in
 from webmap.gate.display.client import DriveConnection, GateClient
-from webmap.gate.protocol import (
-    FromGate,
-    FromPage,
-    FromProgram,
-    Report,
-    RobotSpec,
-    Role,
-)
+from webmap.gate.protocol import FromGate, FromPage, FromProgram, Report, RobotSpec
 from webmap.ros.names import is_agent_url
 
 log = logging.getLogger("webmap.agent")

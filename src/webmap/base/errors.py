@@ -64,5 +64,9 @@ class WireError(WebMapError, ValueError):
     """Bytes that are not a message between a page and the display process."""
 
 
+class NotAllowed(WebMapError):
+    """A person did what only others may do."""
+
+
 class ConfigError(WebMapError, ValueError):
     """An invalid file or argument; the error message gives valid values."""

@@ -7,8 +7,8 @@ from typing import Any, get_args
 import click
 
 from webmap.base.echo import echo
+from webmap.base.roles import Role
 from webmap.gate.locks import state_folder
-from webmap.gate.protocol import Role
 
 
 def _password(from_input: bool, name: str) -> str:

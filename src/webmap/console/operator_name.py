@@ -1,8 +1,9 @@
 """The name of the person at a page, which others see."""
 
 import logging
+from collections.abc import Mapping
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 if TYPE_CHECKING:
     from webmap import Map
@@ -19,6 +20,8 @@ class OperatorName:
     Args:
         map: The map.
     """
+
+    MAY_SEND: ClassVar[Mapping[str, str]] = {"name": "viewer", "place": "viewer"}
 
     def __init__(self, map: "Map") -> None:
         self.map = map

@@ -6,9 +6,9 @@ import hashlib
 import logging
 import math
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import webmap
 from webmap.base.map_file import cell_at
@@ -215,6 +215,8 @@ class Frame:
         floor: The floor plan, if there is one.
     """
 
+    MAY_SEND: ClassVar[Mapping[str, str]] = {"follow": "viewer"}
+
     def __init__(self, map: "Map", title: str, floor: "Floor | None") -> None:
         self.map = map
         self._floor = floor
@@ -304,6 +306,8 @@ class Layout:
         classes: CSS classes of the button in that element.
         restore: Whether the page opens with the last view.
     """
+
+    MAY_SEND: ClassVar[Mapping[str, str]] = {"own": "viewer", "found": "viewer"}
 
     def __init__(
         self,

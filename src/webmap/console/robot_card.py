@@ -191,7 +191,7 @@ class RobotCard:
             icon("icon-close"), type="button", class_="button square quiet"
         )
         close.set("aria-label", "Deselect the robot")
-        close.on("click", lambda event: self.map.set_selected(None))
+        close.on("click", lambda event: self.map.set_selected(None), role="viewer")
         follow = html.button(
             icon("icon-follow"), type="button", class_="button square quiet"
         )

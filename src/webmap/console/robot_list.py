@@ -128,12 +128,14 @@ class Row:
             type="button",
         )
         self._button.set("aria-pressed", "false")
-        self._button.on("click", lambda event: map.pick(robot, event))
+        self._button.on("click", lambda event: map.pick(robot, event), role="viewer")
         self._besides = html.input(type="checkbox")
         self._besides.set("aria-label", f"Also select {robot.name}")
         self._besides.set("title", "Also select this robot for goals")
         self._besides.on(
-            "change", lambda event: map.set_marked(robot, bool(event.checked))
+            "change",
+            lambda event: map.set_marked(robot, bool(event.checked)),
+            role="viewer",
         )
         label = html.label(self._besides, class_="besides")
         self.element = html.li(self._button, label, class_="row")

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from webmap.base.errors import ConfigError
+from webmap.base.errors import ConfigError, NotAllowed
 from webmap.base.plain_files import resolved
+from webmap.base.roles import Role
 from webmap.base.scope import Removal, Scope, current_scope
 from webmap.base.tasks import begin
 from webmap.core.operators import Viewer
@@ -233,6 +234,7 @@ class BasePage:
         event: str,
         handler: Handler,
         *,
+        role: Role = "operator",
         prevent: bool = False,
         stop: bool = False,
     ) -> Removal:
@@ -244,7 +246,7 @@ class BasePage:
         scope = current_scope()
         if scope is None:
             scope = self.scope
-        listener = Listener(handler, scope, prevent=prevent, stop=stop)
+        listener = Listener(handler, scope, role, prevent=prevent, stop=stop)
         self._set_listening(key, (*self._listening.get(key, ()), listener))
 
         def undo() -> None:
@@ -296,6 +298,9 @@ class BasePage:
         begin(work, self._failed)
 
     def _failed(self, error: Exception) -> None:
+        if isinstance(error, NotAllowed):
+            self.notice(str(error))
+            return
         log.error("a handler of %s failed", self.entry.path, exc_info=error)
         if not self.closed:
             self.notice(f"A handler failed: {type(error).__name__}: {error}")

@@ -48,7 +48,11 @@ class Map(WorldView):
         """Robots selected in addition, for actions on several robots; never driven."""
         self.page.contents.append(self)
         self.page.listen(
-            self._mount, self.root, "click", lambda event: self.set_selected(None)
+            self._mount,
+            self.root,
+            "click",
+            lambda event: self.set_selected(None),
+            role="viewer",
         )
 
     def __repr__(self) -> str:
@@ -65,7 +69,12 @@ class Map(WorldView):
         # A group of its own, so that :nth-child in CSS counts robots.
         mount = self.mount(robot.fragment, order=0.0, into=self._robots)
         self.page.listen(
-            mount, robot.svg, "click", lambda event: self.pick(robot, event), stop=True
+            mount,
+            robot.svg,
+            "click",
+            lambda event: self.pick(robot, event),
+            role="viewer",
+            stop=True,
         )
         robot.on_map(self, True)
         self.notify_modules("on_add_robot", robot)

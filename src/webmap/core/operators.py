@@ -17,8 +17,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from webmap.base.roles import Role
 from webmap.base.text import isolated
-from webmap.gate.protocol import Identity, Role
+from webmap.gate.protocol import Identity
 
 log = logging.getLogger("webmap.operators")
 

@@ -3,13 +3,14 @@
 import itertools
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Affine
+from webmap.base.roles import ROLES, Role, covers, who_may
 from webmap.base.scope import Removal, keep
 from webmap.core.base_page import BasePage, page_of
 from webmap.core.extendable import Extendable
@@ -291,6 +292,7 @@ class WorldView(Extendable):
         event: str,
         handler: Handler,
         *,
+        role: Role = "operator",
         prevent: bool = False,
         stop: bool = False,
     ) -> Removal:
@@ -300,6 +302,7 @@ class WorldView(Extendable):
             element: An element that this map shows.
             event: The DOM's name: ``"click"``, ``"pointerdown"``, ``"keydown"``.
             handler: Called with the event, in the model's thread.
+            role: The least role of a viewer whose events the handler gets.
             prevent: Whether the browser's own reaction is prevented.
             stop: Whether the event does not propagate to outer elements.
 
@@ -312,7 +315,7 @@ class WorldView(Extendable):
         if mount is None:
             raise ValueError(f"this map does not show {element!r}")
         return self.page.listen(
-            mount, element, event, handler, prevent=prevent, stop=stop
+            mount, element, event, handler, role=role, prevent=prevent, stop=stop
         )
 
     def add_browser_part(
@@ -326,8 +329,8 @@ class WorldView(Extendable):
 
         Args:
             module: The module. Its ``on_message(message)`` gets the messages of the
-                browser part; its ``on_ready()`` is called whenever the browser part was
-                loaded.
+                browser part that the viewer may send (:func:`least_role`); its
+                ``on_ready()`` is called whenever the browser part was loaded.
             script: An ES module: the name of a built-in one, or a file's path. Its
                 default export is called with the map, the options and a function that
                 sends a message, and returns an object with ``destroy()`` and, to
@@ -400,7 +403,11 @@ class WorldView(Extendable):
         part = self._parts.get(instance)
         if part is None:
             return False
-        self._call(part.module, "on_message", (message,))
+        least = least_role(part.module, message)
+        if covers(self.page.viewer.role, least):
+            self._call(part.module, "on_message", (message,))
+        else:
+            self.show_error(who_may(least))
         return True
 
     def on_module_ready(self, instance: int) -> None:
@@ -436,3 +443,17 @@ class WorldView(Extendable):
             self._rect.width / 2 if x is None else x,
             self._rect.height / 2 if y is None else y,
         )
+
+
+def least_role(module: object, message: Mapping[str, Any]) -> Role:
+    """Return the least role of a viewer whose page may send a module a message.
+
+    The class of the module states it in ``MAY_SEND``: a role for each ``op`` of its
+    messages, or for each of their fields if they have no ``op``. What is not stated
+    needs an operator.
+    """
+    stated: Mapping[str, Role] = getattr(type(module), "MAY_SEND", {})
+    op = message.get("op")
+    names = [op] if isinstance(op, str) else message
+    roles = [stated.get(name, "operator") for name in names]
+    return max(roles, key=ROLES.index, default="operator")

@@ -29,6 +29,7 @@ from webmap.agents.rate_limit import Receiver
 from webmap.base.errors import BridgeError, ConfigError, WireError
 from webmap.base.lifecycle import lifecycle
 from webmap.base.processes import load_soon, python_command
+from webmap.base.roles import Role
 from webmap.base.tasks import spawn
 from webmap.core.runtime import runtime
 from webmap.fleet.agent_robots import (
@@ -41,7 +42,6 @@ from webmap.fleet.robot_files import (
     check_parameters,
     config_for_displays,
 )
-from webmap.gate.protocol import Role
 from webmap.poses.alignment import alignments
 from webmap.ros.names import is_type, normalise_topic
 from webmap.ros.rosbridge.calls import Calls

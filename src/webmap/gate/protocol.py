@@ -9,12 +9,11 @@ from typing import Annotated, Literal
 
 import msgspec
 
+from webmap.base.roles import Role
 from webmap.gate.commands import ProgramCommand, Velocity
 
 PROGRAM = "program"
 """The connection of the display's own Python code."""
-
-Role = Literal["viewer", "operator", "admin"]
 
 
 class Identity(

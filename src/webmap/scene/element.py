@@ -6,7 +6,8 @@ from collections.abc import Awaitable, Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
-from webmap.base.errors import SceneError
+from webmap.base.errors import NotAllowed, SceneError
+from webmap.base.roles import Role, covers, who_may
 from webmap.base.scope import Removal, Scope, Within, current_scope, keep
 from webmap.scene.allowed import (
     attribute_name,
@@ -85,12 +86,19 @@ class Event:
 class Listener:
     """One handler of one kind of event, and the scope in which it was added."""
 
-    __slots__ = ("handler", "prevent", "removal", "scope", "stop")
+    __slots__ = ("handler", "prevent", "removal", "role", "scope", "stop")
 
     def __init__(
-        self, handler: Handler, scope: Scope | None, *, prevent: bool, stop: bool
+        self,
+        handler: Handler,
+        scope: Scope | None,
+        role: Role,
+        *,
+        prevent: bool,
+        stop: bool,
     ) -> None:
         self.handler = handler
+        self.role = role
         self.scope = scope
         self.prevent = prevent
         self.stop = stop
@@ -98,6 +106,9 @@ class Listener:
 
     def call(self, event: Event, report: Report, spawn: Spawn | None) -> None:
         """Call the handler in its scope; an exception is reported, not raised."""
+        if event.viewer is not None and not covers(event.viewer.role, self.role):
+            report(NotAllowed(who_may(self.role)))
+            return
         with Within(self.scope):
             try:
                 result = self.handler(event)
@@ -337,10 +348,11 @@ class Element(Live):
         event: str,
         handler: Handler,
         *,
+        role: Role = "operator",
         prevent: bool = False,
         stop: bool = False,
     ) -> Removal:
-        """Call ``handler`` for every event of this kind, of every viewer.
+        """Call ``handler`` for every event of this kind, of every viewer who may.
 
         The handler joins the current scope and is called within it; it also ends with
         the element. A running coroutine of the handler is cancelled when that scope
@@ -349,6 +361,8 @@ class Element(Live):
         Args:
             event: The browser's name of the event, such as ``"click"``.
             handler: A function, or a coroutine function, that takes an :class:`Event`.
+            role: The least role of a viewer whose events the handler gets; a page shows
+                others who may do this.
             prevent: Whether the browser's default action is prevented.
             stop: Whether the event does not propagate to outer elements.
 
@@ -360,7 +374,7 @@ class Element(Live):
 
         """
         check_event(event)
-        listener = Listener(handler, current_scope(), prevent=prevent, stop=stop)
+        listener = Listener(handler, current_scope(), role, prevent=prevent, stop=stop)
         self._listeners.setdefault(event, []).append(listener)
         self._touch("events")
         listener.removal = Removal(lambda: self._off(event, listener))

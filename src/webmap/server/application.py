@@ -11,7 +11,8 @@ from webmap.core.page import site
 from webmap.core.runtime import FRAME_RATE, runtime
 
 if TYPE_CHECKING:
-    from webmap.gate.protocol import Identity, Role
+    from webmap.base.roles import Role
+    from webmap.gate.protocol import Identity
     from webmap.server.access import Authenticate
     from webmap.server.app import WebApp
     from webmap.server.open_pages import GateConnection

@@ -21,6 +21,7 @@ import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.base.plain_files import LARGEST_STATE, read_file, write_file
+from webmap.base.roles import Role
 from webmap.core.operators import (
     MOST_NAME,
     RESERVED,
@@ -28,7 +29,6 @@ from webmap.core.operators import (
     likeness,
     plain_name,
 )
-from webmap.gate.protocol import Role
 from webmap.server.auth import Attempts, new_token
 
 if TYPE_CHECKING:

@@ -19,13 +19,14 @@ from dataclasses import replace
 
 from starlette.websockets import WebSocket
 
+from webmap.base.roles import Role
 from webmap.core.base_page import PageEntry
 from webmap.core.operators import Viewer, operators
 from webmap.core.page import Site
 from webmap.gate.commands import Refusal as InvalidCommand
 from webmap.gate.commands import begins_like_stop, op_of, parse, stop_in
 from webmap.gate.display.pages import refused_text
-from webmap.gate.protocol import Identity, Refused, Role
+from webmap.gate.protocol import Identity, Refused
 from webmap.server.open_pages import GateConnection, OpenPages
 from webmap.server.outbox import BatchedCallsByLoop, DriveQueue, FrameQueue
 from webmap.server.page_socket import (

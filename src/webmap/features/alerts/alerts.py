@@ -5,12 +5,13 @@ import itertools
 import logging
 import secrets
 import time
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from webmap.base.audience import RARELY, audience
 from webmap.base.lifecycle import lifecycle
+from webmap.base.roles import Role
 from webmap.core.operators import Operator
 from webmap.core.problems import cut, without_numbers
 from webmap.gate.protocol import MAY_MOVE
@@ -346,6 +347,11 @@ class AlertPanel:
         map: The map.
         alerts: The list that all pages share.
     """
+
+    MAY_SEND: ClassVar[Mapping[str, Role]] = {
+        "acknowledge": "operator",
+        "select": "viewer",
+    }
 
     def __init__(self, map: "Map", alerts: Alerts) -> None:
         self.map = map

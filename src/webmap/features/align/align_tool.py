@@ -2,10 +2,12 @@
 
 import asyncio
 import logging
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Pose
+from webmap.base.roles import Role
 from webmap.base.tasks import spawn
 from webmap.core.alignment_store import name_of, store
 from webmap.core.registry import map_modules
@@ -38,6 +40,8 @@ class AlignTool:
     saved alignment applies to all pages and to goals. It is kept in the state folder
     until a program or a fleet file sets another alignment.
     """
+
+    MAY_SEND: ClassVar[Mapping[str, Role]] = {"begin": "admin", "save": "admin"}
 
     def __init__(self, map: "Map") -> None:
         self.map = map

@@ -5,10 +5,12 @@ import math
 import secrets
 import time
 import weakref
+from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from webmap import html
+from webmap.base.roles import Role
 from webmap.features.cameras.camera import AGE_LIMIT
 
 if TYPE_CHECKING:
@@ -95,6 +97,11 @@ class CameraPanel:
     The page chooses the camera of the selected robot, or a wall of cameras of several
     robots, and the position of the panel, and stores all of it.
     """
+
+    MAY_SEND: ClassVar[Mapping[str, Role]] = {
+        "watch": "viewer",
+        "select": "viewer",
+    }
 
     def __init__(self, map: "Map") -> None:
         self.map = map

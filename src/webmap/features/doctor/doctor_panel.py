@@ -83,7 +83,7 @@ class Report:
         self.opener: Element = html.button("Check", type="button", class_="button")
         self.opener.set("popovertarget", where)
         self.opener.set("aria-label", f"Check {name} for problems with driving")
-        self.opener.on("click", lambda event: self._opened())
+        self.opener.on("click", lambda event: self._opened(), role="viewer")
         close = html.button(_close_icon(), type="button", class_="button square quiet")
         close.set("popovertarget", where).set("aria-label", "Close the report")
         self._doing = html.span()

@@ -1,8 +1,10 @@
 """Keys, gamepads and the on-screen stick drive the selected robot."""
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from webmap.base.roles import Role
 from webmap.core.registry import map_modules
 
 if TYPE_CHECKING:
@@ -28,6 +30,8 @@ class Teleop:
     Raises:
         ValueError: If a speed is not a number above 0.
     """
+
+    MAY_SEND: ClassVar[Mapping[str, Role]] = {"active": "viewer"}
 
     def __init__(
         self,

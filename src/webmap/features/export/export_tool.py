@@ -1,7 +1,9 @@
 """Saves the visible map as a picture."""
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from webmap.base.roles import Role
 from webmap.base.text import counted
 from webmap.core.registry import map_modules
 
@@ -24,6 +26,8 @@ class ExportTool:
             button is over the map.
         classes: CSS classes of the button in that element.
     """
+
+    MAY_SEND: ClassVar[Mapping[str, Role]] = {"failed": "viewer", "missing": "viewer"}
 
     def __init__(self, map: "Map", *, place: str = "", classes: str = "") -> None:
         self.map = map

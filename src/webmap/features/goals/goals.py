@@ -1,8 +1,10 @@
 """Tools that send a goal or an initial pose to the selected robots."""
 
 import logging
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from webmap.base.roles import Role
 from webmap.core.map import place_of, robot_and_pose
 from webmap.core.registry import map_modules
 
@@ -72,6 +74,13 @@ class GoalTool:
         ValueError: If ``key`` is not one character, or ``spacing`` is not from 0.3 to
             20 m.
     """
+
+    MAY_SEND: ClassVar[Mapping[str, Role]] = {
+        "ground": "viewer",
+        "mark": "viewer",
+        "goal": "operator",
+        "cancel": "operator",
+    }
 
     def __init__(
         self,
@@ -148,6 +157,11 @@ class InitialPoseTool:
     Raises:
         ValueError: If ``key`` is not one character.
     """
+
+    MAY_SEND: ClassVar[Mapping[str, Role]] = {
+        "covariance": "operator",
+        "pose": "operator",
+    }
 
     def __init__(self, map: "Map", *, button: bool = True, key: str = "i") -> None:
         if len(key) != 1:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from webmap.base.errors import ConfigError
+from webmap.base.roles import Role
 from webmap.base.scope import Removal, keep
 from webmap.base.tasks import spawn
 from webmap.core.layer import Layer
@@ -278,6 +279,14 @@ class Labels:
     Raises:
         ConfigError: If a label is not valid; the error has its number and its key.
     """
+
+    MAY_SEND: ClassVar[Mapping[str, Role]] = {
+        "goal": "operator",
+        "add": "operator",
+        "move": "operator",
+        "to": "operator",
+        "remove": "operator",
+    }
 
     def __init__(
         self,

@@ -5,11 +5,12 @@ import itertools
 import time
 import weakref
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from webmap.base.errors import ConfigError
+from webmap.base.roles import Role
 from webmap.base.scope import Removable, Removal, keep, no_scope
 from webmap.core.problems import draw_or_report
 from webmap.core.registry import map_modules, robot_modules
@@ -257,6 +258,8 @@ class RosoutPanel:
     Raises:
         ConfigError: If there is no such level, or ``lines`` is less than 1.
     """
+
+    MAY_SEND: ClassVar[Mapping[str, Role]] = {"open": "viewer"}
 
     def __init__(
         self,

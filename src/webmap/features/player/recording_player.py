@@ -1,7 +1,7 @@
 """The player bar of a recording, and the commands of a page to the replay."""
 
-from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 from weakref import WeakKeyDictionary
 
 import msgspec
@@ -17,6 +17,7 @@ from webmap.bags.playback import (
     command_of,
 )
 from webmap.base.errors import ConfigError
+from webmap.base.roles import Role
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
@@ -40,6 +41,11 @@ class RecordingPlayer:
         bridge: The bridge to the replay.
         send_command: Sends the replay a command.
     """
+
+    MAY_SEND: ClassVar[Mapping[str, Role]] = {
+        "command": "operator",
+        "value": "operator",
+    }
 
     def __init__(
         self,

@@ -5,14 +5,15 @@ import hashlib
 import logging
 import re
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.base.plain_files import LARGEST_STATE, read_file, write_file
+from webmap.base.roles import Role
 from webmap.base.tasks import spawn
 from webmap.core.registry import map_modules
 from webmap.gate.locks import state_folder
@@ -181,6 +182,12 @@ class RouteTool:
         name: The name of the map; routes of maps with other names are not offered. By
             default the path of the page.
     """
+
+    MAY_SEND: ClassVar[Mapping[str, Role]] = {
+        "load": "viewer",
+        "save": "operator",
+        "delete": "operator",
+    }
 
     def __init__(self, map: "Map", name: str | None = None) -> None:
         self.map = map

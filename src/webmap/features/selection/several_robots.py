@@ -1,8 +1,10 @@
 """Selects several robots at once, and shows what can be done with them."""
 
 import logging
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from webmap.base.roles import Role
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
@@ -27,6 +29,12 @@ class SeveralRobots:
         rows: A CSS selector of the elements whose ``data-robot`` the button selects.
         button: A CSS selector of the page's button that selects them; none if empty.
     """
+
+    MAY_SEND: ClassVar[Mapping[str, Role]] = {
+        "mark": "viewer",
+        "clear": "viewer",
+        "aim": "operator",
+    }
 
     def __init__(
         self,

@@ -1,9 +1,10 @@
 """The view of a map: its control, the robot it follows, and what lies over the map."""
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from webmap.base.errors import ConfigError
+from webmap.base.roles import Role
 from webmap.core.registry import map_modules
 from webmap.modules.declaration import declarations
 from webmap.scene.element import Element
@@ -39,6 +40,8 @@ class Follow:
 
     Following ends when the user moves the view.
     """
+
+    MAY_SEND: ClassVar[Mapping[str, Role]] = {"follow": "viewer"}
 
     def __init__(self, map: "Map") -> None:
         self.map = map

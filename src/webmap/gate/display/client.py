@@ -18,13 +18,14 @@ from collections.abc import Callable, Iterator
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
+from webmap.base.roles import Role
 from webmap.base.scope import Removal
 from webmap.gate import commands, pipe, protocol
 from webmap.gate.commands import stop_in
 from webmap.gate.display.pages import DriveConnection, Pages
 from webmap.gate.display.program import ProgramCommands
 from webmap.gate.display.supervisor import GateLink, GateListener, Supervisor
-from webmap.gate.protocol import FromGate, FromProgram, Report, RobotSpec, Role
+from webmap.gate.protocol import FromGate, FromProgram, Report, RobotSpec
 from webmap.gate.specs import checked
 
 CONFIRMED_AFTER = 2.0

@@ -99,11 +99,12 @@ import msgspec
 from msgspec.structs import replace
 
 from webmap.base.errors import ConfigError, MotionError
+from webmap.base.roles import Role
 from webmap.base.text import isolated
 from webmap.gate import protocol
 from webmap.gate.commands import MoveFor
 from webmap.gate.limits import Cap, Speed, offered, page_cap
-from webmap.gate.protocol import Hello, Identity, Refused, RobotGone, RobotReport, Role
+from webmap.gate.protocol import Hello, Identity, Refused, RobotGone, RobotReport
 
 
 def hello_text(hello: Hello, ticks: int) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from webmap.base.roles import Role
 from webmap.base.text import isolated
 from webmap.gate.actions import Emit, SendToDisplay
 from webmap.gate.commands import Refusal
@@ -19,7 +20,6 @@ from webmap.gate.protocol import (
     Identity,
     Refused,
     RefusedCount,
-    Role,
 )
 
 PERIOD = 0.05

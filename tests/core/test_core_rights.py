@@ -1,0 +1,93 @@
+"""The least role for each message of a page, and for each event of an element."""
+
+import importlib
+import inspect
+import pkgutil
+from types import SimpleNamespace
+
+import pytest
+
+import webmap
+from webmap import Map
+from webmap.base.roles import ROLES, covers
+from webmap.core.operators import Viewer
+from webmap.core.world_view import least_role
+from webmap.scene import html
+from webmap.scene.element import Event
+
+
+def of_pages():
+    """Yield the classes of WebMap that get messages of pages."""
+    for found in pkgutil.walk_packages(webmap.__path__, "webmap."):
+        if not found.name.endswith("__main__"):
+            module = importlib.import_module(found.name)
+            for each in vars(module).values():
+                taken = inspect.isclass(each) and getattr(each, "on_message", None)
+                if taken and each.__module__ == found.name:
+                    (_, message) = inspect.signature(taken).parameters.values()
+                    if message.annotation == dict[str, object] or "dict" in str(
+                        message.annotation
+                    ):
+                        yield each
+
+
+CLASSES = list(of_pages())
+
+
+def test_every_module_of_webmap_states_who_may_send_each_message():
+    assert len(CLASSES) >= 15
+    assert [each.__name__ for each in CLASSES if not vars(each).get("MAY_SEND")] == []
+    for each in CLASSES:
+        assert set(each.MAY_SEND.values()) <= set(ROLES), each
+
+
+class Part:
+    MAY_SEND = {"look": "viewer", "send": "operator", "align": "admin"}
+
+    def __init__(self, map):
+        self.browser_part = map.add_browser_part(self, "features/view/follow.js", {})
+        self.messages = []
+
+    def on_message(self, message):
+        self.messages.append(message)
+
+
+@pytest.mark.parametrize(
+    ("message", "least"),
+    [
+        ({"look": 1}, "viewer"),
+        ({"op": "look", "send": 1}, "viewer"),
+        ({"look": 1, "send": 1}, "operator"),
+        ({"look": 1, "unknown": 1}, "operator"),
+        ({"look": 1, "align": 1}, "admin"),
+        ({"op": "unknown"}, "operator"),
+        ({"op": ["look"]}, "operator"),
+        ({}, "operator"),
+    ],
+)
+@pytest.mark.parametrize("role", ROLES)
+def test_a_message_reaches_a_module_only_from_those_who_may_send_it(
+    make_page, role, message, least
+):
+    page = make_page(Viewer("v1", "Vic", role))
+    map = Map(page.element("webmap_container"))
+    part = Part(map)
+    assert least_role(part, message) == least
+    map.on_module_message(part.browser_part.instance, message)
+    assert part.messages == ([message] if covers(role, least) else [])
+    assert len(page.channel.errors) == (not covers(role, least))
+
+
+def test_a_module_that_states_nothing_gets_messages_of_operators():
+    assert least_role(SimpleNamespace(), {"anything": 1}) == "operator"
+
+
+@pytest.mark.parametrize("role", ROLES)
+@pytest.mark.parametrize("least", [None, *ROLES])
+def test_a_handler_gets_the_events_of_those_who_may(make_page, role, least):
+    page = make_page(Viewer("v1", "Vic", role))
+    button, calls = html.button(), []
+    button.on("click", calls.append, **({} if least is None else {"role": least}))
+    page.dispatch(1, button, Event(kind="click", viewer=page.viewer, page=page))
+    assert len(calls) == covers(role, least or "operator")
+    assert len(page.channel.errors) == 1 - len(calls)
