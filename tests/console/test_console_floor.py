@@ -118,8 +118,8 @@ def test_the_colours_of_the_floor_are_equal_to_those_of_the_style_sheet():
     package = Path(console.__file__).parents[1]
     text = (package / "web/style/tokens.css").read_text("utf-8")
     for token, index in (("--map-void", 1), ("--map-floor", 2)):
-        values = re.findall(rf"{token}: (#\w+);", text)
-        assert values == [COLOURS["day"][index], COLOURS["night"][index]]
+        values = re.findall(rf"{token}: light-dark\((#\w+), (#\w+)\);", text)
+        assert values == [(COLOURS["day"][index], COLOURS["night"][index])]
 
 
 @pytest.mark.parametrize(

@@ -78,7 +78,7 @@ class SpeedTable:
         )
         rows = [
             html.tr(
-                html.th(f"{name} ", html.span(text=unit, class_="unit"), scope="row"),
+                html.th(f"{name} ", html.span(text=unit, class_="minor unit"), scope="row"),
                 *cells,
             )
             for name, unit, cells in (
@@ -122,7 +122,7 @@ class OwnStop:
     def __init__(self, fastest: float) -> None:
         self._fastest = fastest
         self._bound = html.span()
-        self._how = html.span(class_="how")
+        self._how = html.span(class_="minor how")
         self._test = html.p(class_="test")
         self._test.set("role", "status")
         self.elements: list[Element] = [
@@ -243,7 +243,7 @@ class GoalLine:
         self._use = svg.use(href="#goal-sent")
         shape = svg.svg(self._use, class_="shape").set("aria-hidden", "true")
         self._words = html.span(text=NO_GOAL)
-        self._figures = html.span(class_="figures")
+        self._figures = html.span(class_="minor figures")
         self.element = html.p(
             shape, html.span(self._words, self._figures), class_="goal"
         )

@@ -81,7 +81,7 @@ class RobotCard:
         self._shape = StateShape()
         self._name = html.h2(dir="auto")
         self._words = StateWords(html.p())
-        self._reason = html.p(class_="reason")
+        self._reason = html.p(class_="minor reason")
         self._problems = html.p(class_="problems")
         self._problems.set("role", "alert")
         self._x, self._y, self._heading = html.span(), html.span(), html.span()
@@ -274,7 +274,7 @@ class RobotTriggers:
 def fact(name: str, value: "Element", unit: str) -> "Element":
     """Return a value with its name above and its unit after it."""
     return html.div(
-        html.dt(text=name), html.dd(value, html.span(text=unit, class_="unit"))
+        html.dt(text=name), html.dd(value, html.span(text=unit, class_="minor unit"))
     )
 
 

@@ -278,7 +278,7 @@ class RobotList {
     const wanted = groups.flatMap(({ name, robots }) => {
       const text = `${name} (${robots.length})`;
       const known = old.find((each) => each.textContent === text);
-      const title = known ?? html("li", "group-name", { dir: "auto", title: name }, text);
+      const title = known ?? html("li", "webmap-one-line minor group-name", { dir: "auto", title: name }, text);
       return [...(name ? [title] : []), ...robots.map(({ row }) => row)];
     });
     const shown = [...this._list.children];

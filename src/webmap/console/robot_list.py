@@ -24,18 +24,18 @@ class BatteryMark:
     """A battery symbol that shows the robot's charge, with the percentage beside it."""
 
     def __init__(self) -> None:
-        self._fill = svg.rect(x=2.5, y=2.5, width=0, height=8, rx=1, class_="charge")
+        self._fill = svg.rect(x=2.5, y=2.5, width=0, height=8, rx=1, class_="solid")
         self._text = html.span()
         picture = svg.svg(
             svg.rect(x=0.75, y=0.75, width=21.5, height=11.5, rx=2.5),
             self._fill,
-            svg.rect(x=23.5, y=4, width=2, height=5, rx=1, class_="pole"),
+            svg.rect(x=23.5, y=4, width=2, height=5, rx=1, class_="solid"),
             viewBox="0 0 26 13",
         )
         picture.set("aria-hidden", "true")
         name = html.span(text="battery ", class_="unseen")
         self.element = html.span(
-            picture, name, self._text, class_="battery", hidden=True
+            picture, name, self._text, class_="minor battery", hidden=True
         )
 
     def show(self, charge: float | None, low: float = BATTERY_LOW) -> None:
@@ -118,7 +118,7 @@ class Row:
         self._shape = StateShape()
         self._words = StateWords(html.span())
         self._battery = BatteryMark()
-        self._age = html.span(class_="age")
+        self._age = html.span(class_="minor age")
         self._button = html.button(
             *self._shape.elements,
             html.span(text=robot.name, class_="name", dir="auto", title=robot.name),

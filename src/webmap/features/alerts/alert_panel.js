@@ -94,14 +94,14 @@ class AlertPanel {
     /** @type {Map<number, {alert: Alert, row: Row}>} */
     this._known = new Map();
     this._signals = new Signals();
-    this._badge = html("span", "webmap-alert-badge");
+    this._badge = html("span", "webmap-badge webmap-alert-badge");
     this._headline = html("p", "webmap-alert-headline", { role: "status" });
-    this._problem = html("p", "webmap-alert-problem", { role: "status" });
+    this._problem = html("p", "webmap-problem webmap-alert-problem", { role: "status" });
     this._all = button("webmap-alert-all", "Acknowledge all", () => {
       this._acknowledge(this._open().map(({ id }) => id));
     });
-    this._new = html("ol", "webmap-alert-list", { "aria-label": "New alerts" });
-    this._old = html("ol", "webmap-alert-list", { "aria-label": "Acknowledged alerts" });
+    this._new = html("ol", "webmap-list webmap-alert-list", { "aria-label": "New alerts" });
+    this._old = html("ol", "webmap-list webmap-alert-list", { "aria-label": "Acknowledged alerts" });
     this._oldHead = html("h3", "", {}, "Acknowledged");
     this._details = foldedTool(
       "webmap-alerts",
@@ -214,21 +214,21 @@ class Row {
     this._outline = svg("path", { d: ACTIVE, class: "solid" });
     const shape = svg(
       "svg",
-      { viewBox: "0 0 24 24", class: "webmap-alert-shape", "aria-hidden": "true" },
+      { viewBox: "0 0 24 24", class: "webmap-symbol", "aria-hidden": "true" },
       this._outline,
       svg("path", { d: "M12 9v6M12 18v.1", class: "mark" }),
     );
-    this._robot = button("webmap-alert-robot", "", select);
+    this._robot = button("webmap-one-line webmap-alert-robot", "", select);
     this._robot.title = "Select this robot";
-    this._time = html("time", "webmap-alert-time");
-    this._count = html("span", "webmap-alert-count");
+    this._time = html("time", "webmap-muted webmap-alert-time");
+    this._count = html("span", "webmap-muted webmap-alert-count");
     this._text = html("span", "webmap-alert-text");
-    this._end = html("span", "webmap-alert-end");
-    this._by = html("span", "webmap-alert-by");
+    this._end = html("span", "webmap-muted webmap-alert-end");
+    this._by = html("span", "webmap-muted webmap-alert-by");
     this._act = acknowledge && button("webmap-alert-act", "Acknowledge", acknowledge);
     this.element = html(
       "li",
-      "webmap-alert",
+      "webmap-item webmap-alert",
       {},
       shape,
       this._robot,
@@ -241,6 +241,7 @@ class Row {
   /** @param {Alert} alert */
   show({ name, text, began, ended, count, by, acknowledged }) {
     this.element.dataset.state = ended === null ? "active" : "over";
+    this.element.dataset.tone = ended === null ? "bad" : "none";
     this._outline.setAttribute("d", ended === null ? ACTIVE : OVER);
     setText(this._robot, name);
     setText(this._time, clock(began, true));

@@ -48,17 +48,17 @@ export class Signals {
     this._sound.checked = sound;
     this._notify = html("input", "", { type: "checkbox" });
     this._notify.checked = notify && permission() === "granted";
-    this._soundNote = html("p", "webmap-alert-note");
-    this._notifyNote = html("p", "webmap-alert-note", { role: "status" });
+    this._soundNote = html("p", "webmap-muted webmap-alert-note");
+    this._notifyNote = html("p", "webmap-muted webmap-alert-note", { role: "status" });
     this._sound.addEventListener("change", () => this._keep());
     this._notify.addEventListener("change", () => void this._ask());
     this.element = html(
       "div",
       "webmap-alert-signals",
       {},
-      html("label", "", {}, this._sound, "Sound"),
+      html("label", "webmap-row", {}, this._sound, "Sound"),
       this._soundNote,
-      html("label", "", {}, this._notify, "Notification while another window is in front"),
+      html("label", "webmap-row", {}, this._notify, "Notification while another window is in front"),
       this._notifyNote,
     );
     this._ending = new AbortController();

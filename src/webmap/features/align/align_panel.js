@@ -46,13 +46,13 @@ export class AlignPanel {
       html("div", "webmap-align-fields", {}, ...fields),
       html(
         "p",
-        "webmap-align-hint",
+        "webmap-muted webmap-align-hint",
         {},
         "Drag the map to move its content, drag the round handle to turn it. Or use the arrow keys, q and e.",
       ),
       html(
         "div",
-        "webmap-align-ends",
+        "webmap-row webmap-align-ends",
         {},
         html("button", "webmap-button webmap-align-save", { type: "submit" }, "Save"),
         button("webmap-align-cancel", "Cancel", () => actions.cancel()),
@@ -126,7 +126,7 @@ export class AlignPanel {
     input.addEventListener("input", () => this._typed());
     input.addEventListener("keydown", (event) => this._step(event, input));
     this._inputs.set(name, input);
-    return html("label", "", {}, html("span", "", {}, label), input);
+    return html("label", "webmap-muted", {}, html("span", "", {}, label), input);
   }
 
   /**

@@ -54,12 +54,12 @@ class ButtonView:
         self._age = html.span(class_="since")
         self._progress = html.progress()
         self._progress.set("aria-label", f"{spec.label}: running")
-        self._running = html.span(self._progress, self._age, class_="running")
-        self._result = html.p(class_="result")
+        self._running = html.span(self._progress, self._age, class_="webmap-row minor running")
+        self._result = html.p(class_="minor result")
         self._result.set("role", "status")
         self._question = html.div(class_="question", hidden=True)
         self._sheet = html.div(class_="sheet", hidden=True)
-        self._head = html.div(self._press, self._running, class_="head")
+        self._head = html.div(self._press, self._running, class_="webmap-row head")
         self.element: Element = html.div(
             self._head, self._question, self._sheet, self._result, class_="robot-button"
         )
@@ -260,8 +260,8 @@ class FormView:
         error.set("role", "alert")
         self._inputs[path], self._errors[path] = control, error
         name = html.span(text=field.name, class_="name")
-        hint = html.small(text=_hint(field), class_="hint")
-        return html.label(name, control, hint, error, class_="field")
+        hint = html.small(text=_hint(field), class_="minor hint")
+        return html.label(name, control, hint, error, class_="webmap-field field")
 
     def _changed(self, field: Field, path: str, event: Event) -> None:
         if field.type == "bool" and not field.is_array:

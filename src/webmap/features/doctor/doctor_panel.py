@@ -107,12 +107,15 @@ class Report:
             html.div(html.h2(text=f"Check of {name}"), close, class_="doctor-head"),
             status,
             html.div(
-                self._again, self._copy, self._try.button, class_="doctor-actions"
+                self._again,
+                self._copy,
+                self._try.button,
+                class_="webmap-row wraps doctor-actions",
             ),
             self._try.question,
             self._list,
             self._text,
-            class_="doctor",
+            class_="doctor webmap-surface",
             id=where,
             popover="auto",
         )
@@ -185,13 +188,13 @@ def entry(level: str, word: str, words: str, advice: str = "") -> "Element":
     outline, mark = SHAPES[level]
     shape = svg.svg(
         svg.path(d=outline, class_="solid"),
-        svg.path(d=mark, class_="cut"),
+        svg.path(d=mark, class_="slot" if outline else ""),
         viewBox="0 0 24 24",
         class_="icon",
     )
     message = html.div(html.p(html.strong(text=word), words))
     if advice:
-        message.append(html.p(text=advice, class_="advice"))
+        message.append(html.p(text=advice, class_="webmap-muted advice"))
     item = html.li(shape.set("aria-hidden", "true"), message, class_="finding")
     return item.set("data-level", level)
 
@@ -374,8 +377,8 @@ class TryCall:
         no.on("click", lambda event: self._ask(False))
         self.question: Element = html.div(
             *(html.p(text=text) for text in TRY_EXPLANATION),
-            html.div(self._yes, no, class_="doctor-answers"),
-            class_="doctor-question",
+            html.div(self._yes, no, class_="webmap-row wraps doctor-answers"),
+            class_="webmap-muted doctor-question",
             role="group",
             hidden=True,
         )

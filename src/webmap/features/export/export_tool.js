@@ -34,7 +34,7 @@ class ExportTool {
     this._send = send;
     const content = html(
       "div",
-      "webmap-export-choices",
+      "webmap-row webmap-export-choices",
       { role: "group", "aria-label": "Save the view as" },
       button("webmap-export-svg", "SVG", () => this._save("svg")),
       button("webmap-export-png", "PNG", () => this._save("png")),

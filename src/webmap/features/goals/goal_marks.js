@@ -92,7 +92,7 @@ export class GoalMarks {
     mark.sign.setAttribute("d", seen ? SIGNS[seen.shape] : "");
     setHidden(mark.label, seen === null);
     if (seen === null) return;
-    mark.label.className = `webmap-goal-label ${kind}${mine ? " mine" : ""}`;
+    mark.label.className = `webmap-surface webmap-goal-label ${kind}${mine ? " mine" : ""}`;
     setText(mark.text, mine ? seen.text : `${name}: ${seen.text.split(",")[0]}`);
     setHidden(mark.end, !mine || (!seen.over && !cancels) || goal?.state === "cancelling");
     const does = seen.over ? "Hide this goal" : "Cancel goal";
@@ -103,11 +103,11 @@ export class GoalMarks {
   /** @param {string} robot */
   _make(robot) {
     const arrow = svg("path", { d: ARROW });
-    const sign = svg("path", { class: "webmap-goal-sign" });
+    const sign = svg("path", { class: "webmap-symbol webmap-goal-sign" });
     const group = svg("g", { "data-goal-of": robot }, arrow, sign);
     const text = html("span", "webmap-goal-words");
     const end = button("webmap-goal-end", "×", () => this._onEnd(robot));
-    const label = html("div", "webmap-goal-label", { "data-goal-of": robot }, text, end);
+    const label = html("div", "webmap-surface webmap-goal-label", { "data-goal-of": robot }, text, end);
     this._drawing.append(group);
     this._labels.append(label);
     const mark = { group, arrow, sign, label, text, end, pose: { x: 0, y: 0, yaw: 0 } };

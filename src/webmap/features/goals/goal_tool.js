@@ -78,7 +78,7 @@ class GoalTool {
     this._go.append(...toolName("goal", "Send goal"));
     this._go.title = `Send goal (${key.toUpperCase()})`;
     this._cancel = button("webmap-goal-cancel", "Cancel goal", () => this._callOff());
-    this._message = html("span", "webmap-aim-word webmap-goal-word", { role: "status" });
+    this._message = html("span", "webmap-muted webmap-aim-word webmap-goal-word", { role: "status" });
     this._spacing = html("input", "webmap-goal-spacing-value", {
       type: "number",
       min: `${SPACING[0]}`,
@@ -88,7 +88,7 @@ class GoalTool {
     });
     this._apart = html(
       "label",
-      "webmap-goal-spacing",
+      "webmap-muted webmap-row webmap-goal-spacing",
       {},
       "Spacing in m ",
       this._spacing,

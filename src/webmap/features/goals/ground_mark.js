@@ -35,7 +35,7 @@ export class GroundMark {
     this._heard = { ground: null, at: -Infinity };
     this._name = "";
     this._ring = svg("circle", { r: "17", class: "webmap-ground-ring" });
-    this._word = html("span", "webmap-ground-word", { "aria-live": "polite" });
+    this._word = html("span", "webmap-surface webmap-ground-word", { "aria-live": "polite" });
     const drawing = { class: "webmap-aim-drawing", "aria-hidden": "true" };
     this._offs = [
       lay(map, svg("svg", drawing, this._ring)),

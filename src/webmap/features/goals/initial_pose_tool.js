@@ -62,7 +62,7 @@ class InitialPoseTool {
     });
     this._go = button("webmap-aim-go webmap-locate-go", "Set pose", () => this._aim.toggle());
     this._go.title = `Set pose (${key.toUpperCase()})`;
-    this._message = html("span", "webmap-aim-word webmap-locate-word", { role: "status" });
+    this._message = html("span", "webmap-muted webmap-aim-word webmap-locate-word", { role: "status" });
     this._panel = tool("webmap-aim webmap-locate", "Initial pose", this._go, this._message);
     this._uncertainty = new PoseUncertainty();
     this._outline = svg("path", { d: OUTLINE, class: "webmap-locate-arrow" });

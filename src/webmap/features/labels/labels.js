@@ -235,8 +235,8 @@ class Labels {
     const keep = button("webmap-labels-save", "Save", save);
     this._sheet.hidden = false;
     this._sheet.replaceChildren(
-      html("label", "", {}, "Name", name),
-      html("label", "", {}, "Icon", icon),
+      html("label", "webmap-field", {}, "Name", name),
+      html("label", "webmap-field", {}, "Icon", icon),
       cancel,
       keep,
     );

@@ -105,7 +105,7 @@ class LabelLayer(Layer):
             self._drawn[label.id].set_pose(label.x, label.y, 0.0)
             return
         name = svg.text(text=label.name, class_="name", y=26)
-        icon = svg.path(d=ICONS[label.icon], class_="icon")
+        icon = svg.path(d=ICONS[label.icon], class_="webmap-symbol icon")
         icon.set(transform="translate(-9 -9) scale(0.75)")
         upright = svg.g(svg.circle(r=14, class_="spot"), icon, name, class_="upright")
         title = svg.title(text=label.name)

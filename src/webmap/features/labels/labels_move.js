@@ -34,8 +34,8 @@ export class LabelMove {
     this._y = y;
     /** The fields for the sheet. */
     this.fields = [
-      html("label", "", {}, "x in m", x),
-      html("label", "", {}, "y in m", y),
+      html("label", "webmap-field", {}, "x in m", x),
+      html("label", "webmap-field", {}, "y in m", y),
       button("webmap-labels-cancel", "Cancel", () => done(null)),
       button("webmap-labels-keep", "Save", () => done(this._to)),
     ];

@@ -203,7 +203,7 @@ class LayoutTool {
    * @param {boolean} [bad]
    */
   _say(text, bad = false) {
-    this._message.classList.toggle("bad", bad);
+    this._message.classList.toggle("webmap-problem", bad);
     setText(this._message, text);
     this._message.scrollIntoView({ block: "nearest" });
   }

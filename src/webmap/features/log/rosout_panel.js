@@ -91,14 +91,14 @@ class RosoutPanel {
       this._filter();
       this._keep();
     });
-    this._count = html("p", "webmap-rosout-count", { role: "status" });
-    this._badge = html("span", "webmap-rosout-badge");
+    this._count = html("p", "webmap-muted webmap-rosout-count", { role: "status" });
+    this._badge = html("span", "webmap-badge webmap-rosout-badge");
     this._details = foldedTool(
       "webmap-rosout",
       "log",
       "Log",
       { "data-webmap-menu": "" },
-      html("label", "webmap-rosout-level", {}, "Show", this._choice),
+      html("label", "webmap-row webmap-rosout-level", {}, "Show", this._choice),
       this._count,
     );
     this._details.querySelector("summary")?.append(this._badge);
@@ -201,8 +201,8 @@ class BridgeLines {
      *     age: HTMLElement, receivedAt: number}>}
      */
     this.rows = new Map();
-    this._list = html("ol", "webmap-rosout-lines", { "aria-label": `Log of ${name}` });
-    this._note = html("p", "webmap-rosout-note");
+    this._list = html("ol", "webmap-list webmap-rosout-lines", { "aria-label": `Log of ${name}` });
+    this._note = html("p", "webmap-muted webmap-rosout-note");
     this._head = html("h3", "", {}, name);
     this.element = html("section", "webmap-rosout-book", {}, this._head, this._note, this._list);
   }
@@ -245,19 +245,19 @@ class BridgeLines {
     const [word, outline, mark] = LOOKS[level] ?? LOOKS.info;
     const shape = svg(
       "svg",
-      { viewBox: "0 0 24 24", class: "webmap-rosout-shape webmap-symbol", "aria-hidden": "true" },
+      { viewBox: "0 0 24 24", class: "webmap-symbol", "aria-hidden": "true" },
       svg("path", { d: outline, class: "solid" }),
       svg("path", { d: mark, class: "mark" }),
     );
     const times = html("span", "webmap-rosout-times");
-    const age = html("span", "webmap-rosout-age");
+    const age = html("span", "webmap-muted webmap-rosout-age");
     const row = html(
       "li",
-      "webmap-rosout-line",
+      "webmap-item webmap-rosout-line",
       { "data-level": level },
       shape,
       html("strong", "", {}, word),
-      html("span", "webmap-rosout-name", {}, name),
+      html("span", "webmap-muted webmap-one-line webmap-rosout-name", {}, name),
       times,
       age,
       html("span", "webmap-rosout-text", {}, text),

@@ -52,6 +52,9 @@ const SHAPES = {
   goal: "M5 2h15l-4 5.5 4 5.5H8v9H5z",
 };
 
+/** The tone of each kind. */
+const TONES = { stop: "bad", alarm: "warn", result: "good", goal: "active" };
+
 /**
  * The player of a recording: play, pause, seek, speed, and marks on the time line. A page
  * that has it gets a coloured frame.
@@ -109,12 +112,12 @@ class PlayerBar {
     this._speed.addEventListener("change", () => {
       send({ command: "rate", value: Number(this._speed.value) });
     });
-    this._text = html("p", "webmap-player-text", { role: "status" });
+    this._text = html("p", "webmap-surface webmap-player-text", { role: "status" });
     this._element = html(
       "section",
       "webmap-panel webmap-player",
       { "aria-label": "Player of the recording" },
-      html("strong", "webmap-player-badge", {}, "RECORDING"),
+      html("strong", "webmap-badge webmap-player-badge", {}, "RECORDING"),
       this._play,
       this._time,
       html("div", "webmap-player-line", {}, this._line.element, this._slider),
@@ -246,7 +249,7 @@ class MarkLine {
     this._buttons = [];
     this._pressed = { text: "", until: -Infinity };
     this._pointed = "";
-    this._none = html("span", "webmap-player-none");
+    this._none = html("span", "webmap-muted webmap-player-none");
     this.element = html("div", "webmap-player-marks", { role: "group" }, this._none);
     this.element.addEventListener("click", (event) => this._press(event));
     this.element.addEventListener("keydown", (event) => this._move(event));
@@ -301,6 +304,7 @@ class MarkLine {
         "button",
         `webmap-player-mark ${group.kind}`,
         {
+          "data-tone": TONES[group.kind],
           type: "button",
           title: group.text,
           "aria-label": group.text,

@@ -303,8 +303,8 @@ class AreaPanel {
     this._turn.title = "Sweep across the longest side, not along it";
     this._take = button("webmap-area-take", "Add to route", acts.take);
     this._leave = button("webmap-area-leave", "Cancel", acts.leave);
-    const label = html("label", "webmap-area-apart", {}, "Spacing in m ", this._spacing);
-    this._how = html("div", "webmap-route-row", {}, label, this._turn);
+    const label = html("label", "webmap-muted webmap-row webmap-area-apart", {}, "Spacing in m ", this._spacing);
+    this._how = html("div", "webmap-row wraps webmap-route-row", {}, label, this._turn);
     this.element = html(
       "div",
       "webmap-area",
@@ -312,7 +312,7 @@ class AreaPanel {
       this._how,
       html(
         "div",
-        "webmap-route-row",
+        "webmap-row wraps webmap-route-row",
         {},
         ...[this._done, this._undo, this._here, this._take, this._leave],
       ),

@@ -124,13 +124,13 @@ export class SavedRoutes {
     this._message = html("p", "webmap-route-word", { role: "status" });
     this._there = html(
       "div",
-      "webmap-route-row",
+      "webmap-row wraps webmap-route-row",
       {},
       this._chosen,
       this._load,
       ...(saves ? [this._delete] : []),
     );
-    const keep = html("div", "webmap-route-row", {}, this._name, this._save);
+    const keep = html("div", "webmap-row wraps webmap-route-row", {}, this._name, this._save);
     this.element = html(
       "div",
       "webmap-route-saved",

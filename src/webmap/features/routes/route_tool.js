@@ -108,13 +108,13 @@ class RouteTool {
       {},
       html(
         "div",
-        "webmap-route-row begin",
+        "webmap-row wraps webmap-route-row begin",
         {},
         ...[this._edit, this._area.button, this._here, this._clear],
       ),
       this._area.element,
       this._list,
-      html("div", "webmap-route-row", {}, this._loop, this._run, this._pause, this._skip, this._end),
+      html("div", "webmap-row wraps webmap-route-row", {}, this._loop, this._run, this._pause, this._skip, this._end),
       this._message,
       this._saved.element,
     );

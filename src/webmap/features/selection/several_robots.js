@@ -59,7 +59,7 @@ class SeveralBar {
     this._map = map;
     this._most = most;
     this._count = html("strong", "webmap-several-count", { role: "status" });
-    this._problem = html("span", "webmap-several-problem", { role: "status" });
+    this._problem = html("span", "webmap-problem webmap-several-problem", { role: "status" });
     this._stop = stopButton("webmap-several-stop", "STOP these", () => {
       for (const robot of chosen(map)) map.drive.stop(robot);
     });
@@ -69,7 +69,7 @@ class SeveralBar {
     this._send = button("webmap-several-send", "Send goal…", () => send({ aim: true }));
     this._panel = html(
       "section",
-      "webmap-panel webmap-several",
+      "webmap-panel webmap-row wraps webmap-several",
       { "aria-label": "Selected robots" },
       this._count,
       this._send,
@@ -148,7 +148,7 @@ class Box {
     this._select = select;
     /** @type {{id: number, from: Point, drawn: boolean} | null} */
     this._press = null;
-    this._rect = svg("rect", { class: "webmap-several-box" });
+    this._rect = svg("rect", { class: "webmap-line webmap-several-box" });
     this._ending = new AbortController();
     const { signal } = this._ending;
     // Before the module that moves the view.

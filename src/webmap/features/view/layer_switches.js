@@ -230,10 +230,10 @@ class LayerSwitches {
       const value = text === ONLY ? "on" : "off";
       const name = `webmap-layers-${this._number}`;
       const box = this._box(ONLY, { type: "radio", name, value });
-      return html("label", "webmap-layers-row", {}, box, text);
+      return html("label", "webmap-row webmap-layers-row", {}, box, text);
     });
     const names = { role: "radiogroup", "aria-label": "Whose layers are shown" };
-    return html("div", "webmap-layers-whose", names, ...choices);
+    return html("div", "webmap-row wraps webmap-layers-whose", names, ...choices);
   }
 
   /**
@@ -258,7 +258,7 @@ class LayerSwitches {
   _switch(key, text) {
     const [name, one = ""] = key.split(OF);
     const box = this._box(key, { type: "checkbox" });
-    const kind = one ? "webmap-layers-row one" : "webmap-layers-row";
+    const kind = one ? "webmap-row webmap-layers-row one" : "webmap-row webmap-layers-row";
     const row = html("label", kind, {}, box, html("span", "", { dir: "auto" }, text));
     if (one) row.title = `${name}: ${one}`;
     return row;
@@ -324,7 +324,7 @@ class LayerSwitches {
   _note(name, more) {
     const known = this._notes.get(name);
     if (more <= 0 && !known) return;
-    const note = known ?? html("p", "webmap-layers-row one");
+    const note = known ?? html("p", "webmap-row webmap-layers-row one");
     setText(note, `${more} more: “${name}” switches all of them`);
     setHidden(note, more <= 0);
     if (known) return;

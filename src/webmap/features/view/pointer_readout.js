@@ -14,7 +14,7 @@ import { lay } from "../../web/tools/overlay.js";
  * @returns {BrowserPart}
  */
 export default function attach(map, { digits = 2 }) {
-  const output = html("output", "webmap-panel webmap-pointer-readout", {
+  const output = html("output", "webmap-panel webmap-muted webmap-pointer-readout", {
     "aria-label": "Pointer position in metres",
   });
   output.hidden = true;

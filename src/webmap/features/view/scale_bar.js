@@ -47,7 +47,7 @@ export default function attach(map, { width = 120 }) {
     { width: `${width + 2}`, height: "8", "aria-hidden": "true" },
     line,
   );
-  const element = html("div", "webmap-panel webmap-scale-bar", {}, text, drawing);
+  const element = html("div", "webmap-panel webmap-row webmap-scale-bar", {}, text, drawing);
   const take = lay(map, element, "bottom-right");
 
   let shown = NaN;

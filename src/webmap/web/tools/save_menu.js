@@ -107,7 +107,7 @@ class SaveMenu {
    * @returns {() => void} Removes it.
    */
   add(group) {
-    const head = html("p", "webmap-export-head", { "aria-hidden": "true" }, group.heading);
+    const head = html("p", "webmap-muted webmap-export-head", { "aria-hidden": "true" }, group.heading);
     const element = html("div", "webmap-export-group", {}, head, group.content);
     this._groups.set(group, element);
     this._list();

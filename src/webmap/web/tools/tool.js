@@ -29,7 +29,7 @@ const SYMBOLS = {
 export function toolName(symbol, name) {
   const icon = svg(
     "svg",
-    { class: "webmap-tool-icon", viewBox: "0 0 24 24", "aria-hidden": "true" },
+    { class: "webmap-symbol webmap-tool-icon", viewBox: "0 0 24 24", "aria-hidden": "true" },
     svg("path", { d: SYMBOLS[symbol] }),
   );
   return [icon, html("span", "webmap-tool-name", {}, name)];
