@@ -78,7 +78,9 @@ class SpeedTable:
         )
         rows = [
             html.tr(
-                html.th(f"{name} ", html.span(text=unit, class_="minor unit"), scope="row"),
+                html.th(
+                    f"{name} ", html.span(text=unit, class_="minor unit"), scope="row"
+                ),
                 *cells,
             )
             for name, unit, cells in (

@@ -24,7 +24,9 @@ class BatteryMark:
     """A battery symbol that shows the robot's charge, with the percentage beside it."""
 
     def __init__(self) -> None:
-        self._fill = svg.rect(x=2.5, y=2.5, width=0, height=8, rx=1, class_="solid")
+        self._fill = svg.rect(
+            x=2.5, y=2.5, width=0, height=8, rx=1, class_="solid charge"
+        )
         self._text = html.span()
         picture = svg.svg(
             svg.rect(x=0.75, y=0.75, width=21.5, height=11.5, rx=2.5),

@@ -54,7 +54,9 @@ class ButtonView:
         self._age = html.span(class_="since")
         self._progress = html.progress()
         self._progress.set("aria-label", f"{spec.label}: running")
-        self._running = html.span(self._progress, self._age, class_="webmap-row minor running")
+        self._running = html.span(
+            self._progress, self._age, class_="webmap-row minor running"
+        )
         self._result = html.p(class_="minor result")
         self._result.set("role", "status")
         self._question = html.div(class_="question", hidden=True)
