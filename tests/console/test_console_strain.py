@@ -5,10 +5,10 @@ import signal
 from pathlib import Path
 
 import pytest
-from console_ready import assert_free, select, title, wait_until_ready
+from console_ready import assert_free, select, wait_until_ready
 from playwright.sync_api import Page, expect
 
-from equipment.chromium import end_stops, hold, watched_tab
+from equipment.chromium import end_stops, watched_tab
 from equipment.webmap_process import page_of, simulator
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -192,21 +192,3 @@ def test_a_browser_that_stores_nothing_shows_and_changes_everything(
         page.keyboard.press("ArrowRight")
         page.get_by_role("button", name="Take control of Robot 1").click()
         expect(page.locator("#card .state .you")).to_have_text("You have control")
-
-
-@pytest.mark.serial  # a late command stops the robot
-def test_the_stop_button_keeps_its_corner_while_the_window_of_a_driver_changes(
-    open_console,
-):
-    page = open_console()
-    select(page, "Robot 1")
-    hold(page.keyboard, "a", lambda: title(page).text_content() == "You are driving")
-    corner = page.locator(STOP_ALL).evaluate(CORNER)
-    for width, height in ((1440, 900), (1024, 600), (1280, 800)):
-        page.set_viewport_size({"width": width, "height": height})
-        page.wait_for_timeout(400)
-        assert page.locator(STOP_ALL).evaluate(CORNER) == corner
-        assert_free(page.locator(STOP_ALL))
-        expect(page.locator("#card h2")).to_have_text("Robot 1")
-    page.keyboard.up("a")
-    expect(title(page)).to_have_text("You have control")

@@ -151,4 +151,4 @@ def test_refused_messages_are_shown_for_a_minute_after_the_last_one(monkeypatch)
     assert not is_shown(61)
     counted.note("Ann", 1, "drive: too old", times[-1])
     assert is_shown(62)
-    assert "4 messages refused" in details.text
+    assert "4 refused" in details.text

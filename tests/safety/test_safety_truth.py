@@ -113,7 +113,7 @@ def test_a_slow_link_lowers_the_speed_limit_and_the_page_shows_the_reason(bench)
     bench.drive_off(within=45.0)
     text = bench.tab.evaluate(TEXT)
     assert "slow connection: " in text, text
-    assert "Speed limit 0.2" in text, text
+    assert "at most 0.2" in text, text
     # A round trip takes both ways, and longer because of the wait for a tick.
     most = BLIND / (2 * EACH_WAY + DEADMAN + STOPS_WITHIN)
     now = time.monotonic()

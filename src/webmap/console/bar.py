@@ -1,5 +1,6 @@
 """Lists that unfold from the page's bar: bridges and refused messages."""
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING
@@ -45,7 +46,8 @@ class BridgeList:
         self._button_of = button_of
         self._routers = routers
         self._waiting = waiting
-        self._text = html.span()
+        self._text = html.span(class_="text")
+        self._shown = ""
         self._summary = html.summary(
             html.span(class_="dot").set("aria-hidden", "true"),
             self._text,
@@ -71,12 +73,22 @@ class BridgeList:
         links = {*of_routers, *of_bridges}
         worst = next((name for name in WORST if name in links), "open")
         self._summary.set("data-link", worst)
-        self._text.text = summary(of_bridges, of_routers)
+        self._show_summary(summary(of_bridges, of_routers))
         self._waiting.text = " ".join(
             f"{text[0].upper()}{text[1:]}."
             for link, text in routers.values()
             if link != "open"
         )
+
+    def _show_summary(self, text: str) -> None:
+        if text == self._shown:
+            return
+        self._shown = text
+        self._summary.set("title", text)
+        self._text.clear()
+        # Each part is shown as a whole, or not at all where the bar has no room for it.
+        for part in re.split(r"(?<=, )", text):
+            self._text.append(html.span(text=part))
 
     def _show(self, key: "Bridge | str", state: tuple[str, str]) -> None:
         line, word = self._lines.get(key) or self._add(key)
@@ -182,7 +194,7 @@ class RefusedList:
             return
         self._shown = rows, is_recent
         self._details.set(hidden=not is_recent)
-        self._text.text = f"{counted(refusals.total, 'message')} refused"
+        self._text.text = f"{refusals.total} refused"
         self._newest.text = rows[0].last if rows else ""
         self._list.clear()
         for row in rows[:SHOWN]:

@@ -3,7 +3,7 @@ import { listenToPalette } from "./palette.js";
 import { listenToRobots } from "./robot_list.js";
 import { markRobots } from "./robot_marks.js";
 import { byId, listenToSheet, nameSheet, onBeat, setText, typing } from "../web/tools/elements.js";
-import { keepInView, keepSizes, listenToList, listenToTools } from "./view_tools.js";
+import { foldTools, keepInView, keepSizes, listenToList, listenToTools } from "./view_tools.js";
 
 /**
  * The parts of the console that run in the browser, because they must be quick or work
@@ -40,6 +40,7 @@ export default function attach(map, options, send) {
   listenToList(map, signal);
   keepInView(map, signal);
   listenToSheet(signal);
+  foldTools(signal);
   return {
     destroy() {
       ending.abort();

@@ -1,4 +1,4 @@
-import { byId } from "../web/tools/elements.js";
+import { byId, setHidden } from "../web/tools/elements.js";
 import { rotate, translate } from "../web/view.js";
 
 /** @typedef {import('../web/view.js').Matrix} Matrix */
@@ -72,6 +72,45 @@ export function listenToTools(map, options, signal) {
     },
     { signal, capture: true },
   );
+}
+
+/**
+ * Fold the tools that have no room in the bar into More: they are in further lines, which
+ * are hidden until it is pressed.
+ *
+ * @param {AbortSignal} signal
+ */
+export function foldTools(signal) {
+  const [tools, more] = [byId("tools"), byId("tools-more")];
+  const buttons = () => [...tools.querySelectorAll(".webmap-tool-go, .webmap-export-go")];
+  const unfold = (/** @type {boolean} */ open) => {
+    tools.classList.toggle("unfolded", open);
+    more.setAttribute("aria-expanded", `${open}`);
+  };
+  const fold = () => {
+    const all = buttons();
+    const top = tools.getBoundingClientRect().top + tools.clientTop;
+    const below = all.map((one) => one.getBoundingClientRect().top > top + 1);
+    all.forEach((one, i) => one.classList.toggle("folded", below[i]));
+    setHidden(more, !below.includes(true));
+    if (more.hidden) unfold(false);
+  };
+  more.addEventListener("click", () => unfold(more.ariaExpanded !== "true"), { signal });
+  // A tool of the further lines begins to work where it was pressed.
+  tools.addEventListener("click", () => unfold(false), { signal });
+  const sizes = new ResizeObserver(fold);
+  const watch = () => {
+    // Also when a style sheet comes after a tool.
+    sizes.disconnect();
+    for (const each of [tools, ...buttons()]) sizes.observe(each);
+  };
+  const added = new MutationObserver(watch);
+  added.observe(tools, { childList: true });
+  watch();
+  signal.addEventListener("abort", () => {
+    sizes.disconnect();
+    added.disconnect();
+  });
 }
 
 /**

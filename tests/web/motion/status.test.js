@@ -234,10 +234,10 @@ test("a lower-case name at the beginning of a sentence is not capitalized", () =
 
 test("the speed limit is shown with its reason", () => {
   const why = ["stop not verified"];
-  assert.equal(
-    capOf({ ...REPORT, why }),
-    "Speed limit 0.30 m/s, 0.60 rad/s (stop not verified)",
-  );
+  assert.deepEqual(capOf({ ...REPORT, why }), {
+    why: "Speed limit: stop not verified",
+    cap: "at most 0.30 m/s, 0.60 rad/s",
+  });
 });
 
 test("a failed stop hook is shown in every state of a connected robot", () => {

@@ -31,6 +31,7 @@ export class Panel {
     this._mark = html("span", "webmap-teleop-mark", { "aria-hidden": "true" });
     this._title = html("strong", "webmap-teleop-title");
     this._detail = html("span", "webmap-teleop-detail");
+    this._why = html("p", "webmap-teleop-why");
     this._cap = html("p", "webmap-teleop-cap");
     this._speed = html("p", "webmap-teleop-speed", { title: "Measured velocity" });
     this._own = html("p", "webmap-teleop-own");
@@ -57,13 +58,13 @@ export class Panel {
       "Moves the robot slowly, ends the commands and measures when the robot stops";
     this._stick = button("webmap-teleop-stick", "Stick", acts.stick);
     this._stick.title = "Show a stick on the screen to drive with";
-    const state = html(
-      "p",
-      "webmap-teleop-state",
-      { role: "status" },
-      this._title,
-      " ",
-      this._detail,
+    this._state = html("p", "webmap-teleop-state", { role: "status" }, this._title, " ");
+    // The most important first: a page with little room leaves out the last ones.
+    this._words = html(
+      "div",
+      "webmap-teleop-words",
+      {},
+      ...[this._state, this._test, this._why, this._speed, this._cap, this._own],
     );
     this._fold = button("webmap-teleop-fold", "Figures", () => this._turn());
     this._fold.title = "Show the velocities sent, arrived and measured, delays and distances";
@@ -76,12 +77,7 @@ export class Panel {
       "webmap-panel webmap-teleop",
       { "aria-label": "Driving" },
       this._mark,
-      html(
-        "div",
-        "webmap-teleop-words",
-        {},
-        ...[state, this._test, this._speed, this._cap, this._own],
-      ),
+      this._words,
       this._acts,
       this.stop,
       this._figures,
@@ -93,16 +89,18 @@ export class Panel {
    * @param {RobotReport | null} report
    * @param {number | null} delay
    */
-  showState({ state, title, detail, warns = false }, report, delay) {
+  showState({ state, title, detail, least, warns = false }, report, delay) {
     if (this.element.dataset.state !== state) this.element.dataset.state = state;
     this.element.classList.toggle("warns", warns);
     setText(this._title, title);
     setText(this._detail, detail);
+    const place = least ? this._words : this._state;
+    if (this._detail.parentElement !== place) place.append(this._detail);
     const stated = report?.why.some((why) => why.startsWith("slow connection"));
-    const age = report?.age ?? delay;
-    const cap = report ? capOf(report) + (stated ? "" : slowness(age)) : "";
+    const slow = stated ? "" : slowness(report?.age ?? delay);
+    const { why, cap } = report ? capOf(report, slow) : { why: "", cap: "" };
+    setText(this._why, why);
     setText(this._cap, cap);
-    setAttribute(this._cap, "title", cap);
   }
 
   /** @param {HTMLElement} element A button of another part, beside those of this panel. */
@@ -215,7 +213,7 @@ function mayTest(report) {
 
 /** @param {number | null} delay */
 function slowness(delay) {
-  return delay !== null && delay >= SLOW ? `. Slow connection: ${Math.round(delay)} ms` : "";
+  return delay !== null && delay >= SLOW ? `slow connection: ${Math.round(delay)} ms` : "";
 }
 
 /**

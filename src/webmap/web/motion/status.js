@@ -18,9 +18,11 @@ import { stopText } from "./stops.js";
  */
 
 /**
- * `warns`: whether the detail names another program, or stop hooks that failed.
+ * `least`: whether the detail is only a hint or velocities, no reason. `warns`: whether it
+ * names another program, or stop hooks that failed.
  *
- * @typedef {{state: State, title: string, detail: string, warns?: boolean}} Description
+ * @typedef {{state: State, title: string, detail: string, least?: boolean,
+ *     warns?: boolean}} Description
  */
 
 /**
@@ -77,7 +79,7 @@ export function describe(status, robot, report, active, more = {}) {
   if (!other && hooks.length === 0) return state;
   // In every state: another program that moves the robot, and failed stop hooks.
   const words = [state.detail, other ?? "", ...hooks].filter(Boolean).map(sentence);
-  return { ...state, detail: words.join(" "), warns: true };
+  return { ...state, detail: words.join(" "), least: false, warns: true };
 }
 
 /**
@@ -94,7 +96,7 @@ function ofRobot(status, robot, report, active, more) {
     return description("unconfirmed", WORDS.unconfirmed, reasonOf(verdict));
   }
   if (robot === null) {
-    return description("none", "No robot selected", "Select a robot to drive it.");
+    return hint("none", "No robot selected", "Select a robot to drive it.");
   }
   if (report === null) {
     const title = stateText(activity in WORDS ? activity : "watched", null, seen);
@@ -108,7 +110,7 @@ function ofRobot(status, robot, report, active, more) {
   }
   if (heldByAnother(report)) return ofOther(title, status, report, more.request);
   if (!active) {
-    return description("free", "Map not active", "Click this map to drive from it.");
+    return hint("free", "Map not active", "Click this map to drive from it.");
   }
   const driven = status.driven === robot;
   const kept = driven ? ofInputs(status, report, title) : ofTaking(status, report, title);
@@ -152,13 +154,17 @@ function wordsOf(name, report, { since = "", program = "another program" }) {
 }
 
 /**
- * Return the speed limits and their reasons, as text.
+ * Return the speed limits and their reasons, as two texts.
  *
  * @param {RobotReport} report
+ * @param {string} [more] Another reason.
  */
-export function capOf(report) {
-  const why = report.why.length > 0 ? ` (${report.why.join(", ")})` : "";
-  return `Speed limit ${limit(report.v, "m/s")}, ${limit(report.w, "rad/s")}${why}`;
+export function capOf({ v, w, why }, more = "") {
+  const reasons = [...why, more].filter(Boolean).join(", ");
+  return {
+    why: `Speed limit: ${reasons || "no reason given"}`,
+    cap: `at most ${limit(v, "m/s")}, ${limit(w, "rad/s")}`,
+  };
 }
 
 /**
@@ -293,24 +299,24 @@ function ofDoing(name, title, report, inputs) {
   switch (name) {
     case "blocked": {
       const sent = `Sent: ${velocityText(report.sent)}.`;
-      return description("blocked", title, `${sent} Measured: ${speedOf(report)}.`);
+      return hint("blocked", title, `${sent} Measured: ${speedOf(report)}.`);
     }
     case "driven":
-      return description("driving", title, speedOf(report));
+      return hint("driving", title, speedOf(report));
     case "stopping":
     case "settling":
-      return description("stopping", title, speedOf(report));
+      return hint("stopping", title, speedOf(report));
     case "disobeying":
     case "unreachable":
     case "moving":
     case "other":
-      return description("moving", title, report.measured ? speedOf(report) : "");
+      return hint("moving", title, report.measured ? speedOf(report) : "");
     case "navigating":
     case "navigating_held":
-      return description("moving", title, `To drive, hold ${inputs}. This cancels the goal.`);
+      return hint("moving", title, `To drive, hold ${inputs}. This cancels the goal.`);
   }
-  if (name !== "held") return description("free", title, `Hold ${inputs} to drive.`);
-  return description("ready", title, `Hold ${inputs} to drive. Press Space for STOP.`);
+  if (name !== "held") return hint("free", title, `Hold ${inputs} to drive.`);
+  return hint("ready", title, `Hold ${inputs} to drive. Press Space for STOP.`);
 }
 
 function gettingReady() {
@@ -334,6 +340,16 @@ function inputBlocked() {
  */
 function description(state, title, detail) {
   return { state, title, detail };
+}
+
+/**
+ * @param {State} state
+ * @param {string} title
+ * @param {string} detail No reason.
+ * @returns {Description}
+ */
+function hint(state, title, detail) {
+  return { state, title, detail, least: true };
 }
 
 /**
