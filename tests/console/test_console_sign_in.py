@@ -80,5 +80,8 @@ def test_a_viewer_sees_the_robots_and_drives_none(url, chromium):
         expect(driving).to_contain_text("You may look and press STOP")
         expect(driving.get_by_role("button", name="Take control")).to_be_hidden()
         assert "1 session ended" in user(state, "end", "bob")
+        page.allowed += ["WebSocket connection .* failed"]
+        told = page.get_by_text("You are not signed in any more: load the page again")
+        expect(told.first).to_be_visible()
         page.reload()
         expect(page.get_by_label("Password")).to_be_visible()

@@ -13,7 +13,12 @@ import { Panel, Requests, StickPad } from "./teleop_panel.js";
 /** @typedef {import('../../web/motion/status.js').Description} Description */
 
 /** @typedef {(message: object) => void} Send */
-/** @typedef {{holonomic?: boolean | null, stopPlace?: string}} Options */
+/**
+ * @typedef {{holonomic?: boolean | null, stopPlace?: string, looks?: boolean}} Options
+ */
+
+/** The detail of a robot that could be driven, for a person who may not drive. */
+const LOOKS = "You may look and press STOP. An operator can drive.";
 
 /**
  * Drive the selected robot with keys, an on-screen stick or a gamepad, and show the
@@ -22,6 +27,7 @@ import { Panel, Requests, StickPad } from "./teleop_panel.js";
  * Options: `holonomic`, whether Q and E, and the sticks, move the robot sideways; null
  * if each robot's element decides (`data-holonomic`). `stopPlace`, a selector of the
  * page's own element for the robot's STOP; without it STOP is a part of the panel.
+ * `looks`, whether the person may not drive.
  * Speeds are not known here: the gate scales. Sends `{active}` when this map starts or
  * stops to receive the page's keys.
  *
@@ -47,10 +53,11 @@ class Teleop {
    * @param {Options} options
    * @param {Send} send
    */
-  constructor(map, { holonomic = false, stopPlace = "" }, send) {
+  constructor(map, { holonomic = false, stopPlace = "", looks = false }, send) {
     this._map = map;
     /** @type {import('../../web/drive.js').Drive} */
     this._drive = map.drive;
+    this._looks = looks;
     this._panel = new Panel({
       stop: () => this._stop(),
       lease: () => this._lease(),
@@ -165,7 +172,7 @@ class Teleop {
     const verdict = this._drive.verdicts.find((one) => one.robot === robot);
     const request = requests.find((one) => one.robot === robot);
     this._requests.show(requests);
-    const useful = report !== null && isStickUseful(report);
+    const useful = !this._looks && report !== null && isStickUseful(report);
     this._stick.holonomic = this._drivingMap.holonomic;
     this._stick.show(useful, status.pressed && status.blocked);
     const pointers = { touch: this._touch.matches, stick: this._stick.wanted };
@@ -176,9 +183,12 @@ class Teleop {
     const words = describe(status, robot, report, active, more);
     const idle = words.state === "free" || words.state === "ready";
     if (idle && this._devices.codeless) words.detail = NO_POSITIONS;
+    const invites = idle || words.detail.startsWith("To drive");
+    if (this._looks && invites) words.detail = LOOKS;
     this._panel.showState(withoutKeys(words, pointers, inputs), report, status.delay);
     const asking = request?.by === status.connection;
-    this._panel.showButtons(report, asking, useful ? this._stick.wanted : null);
+    const stick = useful ? this._stick.wanted : null;
+    this._panel.showButtons(report, asking, stick, this._looks);
     const moving = robot === null ? null : this._drive.motionDelay(robot);
     // Reports from before the connection was lost do not describe the present.
     const current = status.link === "lost" ? null : report;

@@ -52,7 +52,11 @@ class Teleop:
         self.browser_part = map.add_browser_part(
             self,
             "features/drive/teleop.js",
-            {"holonomic": holonomic, "stopPlace": stop_place},
+            {
+                "holonomic": holonomic,
+                "stopPlace": stop_place,
+                "looks": map.page.viewer.role == "viewer",
+            },
             "features/drive/teleop.css",
         )
 

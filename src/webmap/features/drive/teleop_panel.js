@@ -162,11 +162,12 @@ export class Panel {
    * @param {boolean} asking Whether this page has requested control of the robot.
    * @param {boolean | null} stick Whether the stick is switched on; null where it is
    *     useless.
+   * @param {boolean} looks Whether the person may not drive: only STOP is of use.
    */
-  showButtons(report, asking, stick) {
+  showButtons(report, asking, stick, looks) {
     const name = report?.name ?? "";
     const robots = report === null ? [] : [report.robot];
-    const act = controlAction(report, asking);
+    const act = looks ? null : controlAction(report, asking);
     setHidden(this._lease, act === null);
     if (act !== null) {
       setText(this._lease, act);
@@ -174,7 +175,7 @@ export class Panel {
       setAttribute(this._lease, "aria-label", `${act} of ${name}`);
     }
     const stops = report === null ? [] : [stopKey(report)];
-    this._reset.show(report !== null && isLatched(report), stops);
+    this._reset.show(!looks && report !== null && isLatched(report), stops);
     this._tester.show(report !== null && mayTest(report), robots);
     const known = report?.stop_time != null;
     this._tester.element.classList.toggle("known", known);
