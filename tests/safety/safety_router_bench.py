@@ -105,9 +105,9 @@ class RouterBench(ProvingBench):
             "tls/127.0.0.1:0",
             "--users",
             users,
-            "--certificate",
+            "--tls-cert",
             TLS / "router.pem",
-            "--key",
+            "--tls-key",
             TLS / "router.key",
         )
         self.place = self.router.ready(r"is ready at (zenohs://127\.0\.0\.1:\d+)")
