@@ -237,11 +237,13 @@ export function keepInView(map, signal) {
     area = now;
     [width, height] = [map.width, map.height];
     if (map.following || !map.selected) return;
-    const [left, top] = placeOnScreen(map, map.selected) ?? [Number.NaN, Number.NaN];
+    const seen = isInside(before, placeOnScreen(map, map.selected));
     if (x !== 0 || y !== 0) map.setView(translate(map.view, -x, -y));
     const { e, f } = map.view;
-    const across = left > before.left && left < before.right;
-    if (across && top > before.top && top < before.bottom) show(map, map.selected);
+    // Closing leaves the robot where it was, unless another part still covers that place.
+    const grown = now.width > before.width + 1 || now.height > before.height + 1;
+    const back = grown && isInside(now, placeOnScreen(map, map.selected));
+    if (seen && !back) show(map, map.selected);
     [x, y] = [map.view.e - e, map.view.f - f];
   };
   const off = map.onView(() => {
@@ -258,6 +260,15 @@ export function keepInView(map, signal) {
     sizes.disconnect();
     panels.disconnect();
   });
+}
+
+/**
+ * @param {DOMRect} area
+ * @param {Point | null} place
+ * @returns {boolean} Whether a place is in an area.
+ */
+function isInside({ left, right, top, bottom }, place) {
+  return place !== null && place[0] > left && place[0] < right && place[1] > top && place[1] < bottom;
 }
 
 /**
