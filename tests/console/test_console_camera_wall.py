@@ -197,7 +197,7 @@ def value(wall, name: str) -> str:
 def test_a_wall_without_storage_shows_only_cells_in_view_on_a_phone(open_page, robots):
     forbidden = """Object.defineProperty(window, 'localStorage', {
         get() { throw new DOMException('forbidden', 'SecurityError'); } })"""
-    page = open_page(390, 700, forbidden, has_touch=True, is_mobile=True)
+    page = open_page(390, 790, forbidden, has_touch=True, is_mobile=True)
     wall = open_wall(page)
     wall.locator(".camera-add").click()
     expect(wall.locator(".camera-cell")).to_have_count(3)
