@@ -35,7 +35,9 @@ NOT_AT_REST = {
     "Selected robot": "of a map with several robots that have layers",
     "All robots": "of a map with several robots that have layers",
     "Restore defaults": "of the settings of a gamepad",
+    "Robots": "of a phone on its side",
     "Send goal here": "of a label",
+    "…": "of a bar without room for all tools",
 }
 """Buttons that another state of the page shows: tests/project looks in the code."""
 
