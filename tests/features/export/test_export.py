@@ -257,6 +257,7 @@ def test_the_export_button_of_the_console_saves_its_map(
 def test_the_export_menu_fits_on_a_phone_screen(chromium, console):
     with watched_tab(chromium, 390, 844) as tab:
         tab.goto(console)
+        tab.get_by_role("button", name="More tools").click()
         tab.locator(".webmap-export-go").click()
         expect(tab.locator(".webmap-export-png")).to_be_visible()
         box = tab.locator(".webmap-export-menu").bounding_box()
