@@ -1,6 +1,7 @@
 """Named users: their file, signing in, what ends a session, and what stays secret."""
 
 import json
+import threading
 import time
 
 import httpx
@@ -202,6 +203,52 @@ def test_the_oldest_session_ends_for_a_new_one(people, tmp_path, monkeypatch):
         True,
         True,
     ]
+
+
+def test_a_folder_that_cannot_be_read_ends_no_session(people, monkeypatch):
+    session = people.sign_in("ana", PASSWORD, "10.0.0.1")
+
+    def fail(folder):
+        raise OSError(5, "Input/output error")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(module.Path, "iterdir", fail)
+        with pytest.raises(OSError, match="Input/output"):
+            people.refresh()
+    assert people.viewer(session) is not None
+
+
+def test_a_full_disk_refuses_a_sign_in_in_a_sentence(people, monkeypatch, caplog):
+    def fail(file, data):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(module, "write_file", fail)
+    refused = people.sign_in("ana", PASSWORD, "10.0.0.1")
+    assert "disk may be full" in refused.text
+    assert "No space left" in caplog.text
+
+
+def test_a_slow_disk_keeps_nobody_waiting_who_has_signed_in(people, monkeypatch):
+    session = people.sign_in("ana", PASSWORD, "10.0.0.1")
+    writing, go_on = threading.Event(), threading.Event()
+
+    def wait(file, data):
+        writing.set()
+        assert go_on.wait(20)
+
+    monkeypatch.setattr(module, "write_file", wait)
+    other = threading.Thread(target=people.sign_in, args=("ana", PASSWORD, "10.0.0.2"))
+    other.start()
+    answers = []
+    asking = threading.Thread(target=lambda: answers.append(people.viewer(session)))
+    try:
+        assert writing.wait(20)
+        asking.start()
+        asking.join(20)
+        assert answers[0].name == "ana"
+    finally:
+        go_on.set()
+        other.join(20)
 
 
 # Over HTTP.

@@ -14,7 +14,6 @@ from starlette.responses import HTMLResponse, RedirectResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import Receive, Scope, Send
 
-from webmap.base.errors import ConfigError
 from webmap.core.base_page import PageEntry
 from webmap.core.page import Site
 from webmap.server.access import Settings
@@ -114,7 +113,7 @@ class WebApp:
             try:
                 await asyncio.to_thread(people.refresh)
                 trouble = ""
-            except (ConfigError, OSError) as error:
+            except Exception as error:  # or sessions would never end again
                 if str(error) != trouble:
                     trouble = str(error)
                     log.error("the users stay as they were: %s", trouble)

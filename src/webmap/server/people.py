@@ -9,6 +9,7 @@ file is removed, or when the user is changed.
 import contextlib
 import hashlib
 import json
+import logging
 import secrets
 import threading
 import time
@@ -33,6 +34,8 @@ from webmap.server.auth import Attempts, new_token
 
 if TYPE_CHECKING:
     from argon2 import PasswordHasher
+
+log = logging.getLogger("webmap.server")
 
 SESSION_S = 7 * 24 * 3600.0
 """How long a session lasts after its sign-in, in seconds."""
@@ -215,8 +218,13 @@ class SessionFiles:
         return read_file(self._secret, 1024, links=False).decode("ascii", "replace")
 
     def names(self) -> frozenset[str]:
-        """Return the names of all sessions: they are no secret."""
-        with contextlib.suppress(OSError):
+        """Return the names of all sessions: they are no secret.
+
+        Raises:
+            OSError: If the folder cannot be read.
+
+        """
+        with contextlib.suppress(FileNotFoundError):  # nobody has signed in yet
             return frozenset(
                 file.stem for file in self.folder.iterdir() if file.suffix == ".json"
             )
@@ -253,6 +261,9 @@ class SessionFiles:
 class People:
     """The users and sessions of a running server; used by several threads.
 
+    The lock is never held while a disk is read or written: the thread that passes on
+    commands asks who has a session.
+
     Args:
         folder: WebMap's state folder.
         now: Seconds since 1970.
@@ -272,8 +283,6 @@ class People:
         self._sessions: dict[str, Session] = {}
         self._tries = [Attempts(limit) for limit in _TRIES]
         self._lock = threading.RLock()
-        # One at a time: each takes 64 MiB.
-        self._hashing = threading.Lock()
         self.secret = self._files.secret()
         """Signs the cookies and keys of sessions."""
         # So that an unknown name takes as long as a known one.
@@ -290,7 +299,10 @@ class People:
             return Viewer(session, found.user, role, signs_out=True)
 
     def sign_in(self, name: str, password: str, address: str) -> str | Denied:
-        """Return a new session; takes a tenth of a second.
+        """Return a new session; takes a tenth of a second and 64 MiB.
+
+        Called by one thread at a time, so that wrong passwords are counted before the
+        next one is compared.
 
         Args:
             name: The name of a user.
@@ -307,26 +319,30 @@ class People:
                 text = f"Too many wrong passwords: try again after {wait} s."
                 return Denied(text, wait)
             user = self._users.get(name)
-        with self._hashing:
-            right = _fits(user.password if user else self._nobody, password[:LONGEST])
-        with self._lock:
-            if not right or user is None or self._users.get(name) != user:
+        right = _fits(user.password if user else self._nobody, password[:LONGEST])
+        if not right or user is None:
+            with self._lock:
                 for each, key in tries:
                     each.failed(key, now)
-                return Denied(WRONG)
-            session = secrets.token_urlsafe(16)
-            made = Session(name, self._now(), address, _proof(user))
+            return Denied(WRONG)
+        session = secrets.token_urlsafe(16)
+        made = Session(name, self._now(), address, _proof(user))
+        try:
             self._files.write(_name_of(session), made)
+        except OSError as error:
+            log.error("%s cannot sign in: %s: %s", name, self._files.folder, error)
+            return Denied("WebMap cannot keep your sign-in: its disk may be full.")
+        with self._lock:
             self._sessions[_name_of(session)] = made
             oldest = sorted(self._sessions, key=lambda each: self._sessions[each].since)
-            for ended in oldest[: max(0, len(oldest) - MOST_SESSIONS)]:
-                self._files.remove(ended)
-            return session
+        for ended in oldest[: max(0, len(oldest) - MOST_SESSIONS)]:
+            self._files.remove(ended)
+        return session
 
     def end(self, session: str) -> None:
         """End a session: its user signs out."""
+        self._files.remove(_name_of(session))
         with self._lock:
-            self._files.remove(_name_of(session))
             self._sessions.pop(_name_of(session), None)
 
     def refresh(self) -> None:
@@ -338,21 +354,35 @@ class People:
 
         """
         with self._lock:
-            names = self._files.names()
-            for name in names - self._sessions.keys():
-                found = self._files.read(name)
-                if found is not None:
-                    self._sessions[name] = found
-            for name in self._sessions.keys() - names:
-                del self._sessions[name]
-            stamp = _stamp(self._file.path)
-            if stamp != self._stamp:
-                self._stamp = stamp
-                self._users = self._file.read()
-            for name, session in [*self._sessions.items()]:
-                if not self._lasts(session):
-                    self._files.remove(name)
+            known = {*self._sessions}
+        names = self._files.names()
+        read = {name: self._files.read(name) for name in names - known}
+        with self._lock:
+            # A sign-in of this moment is in neither set.
+            for name in known - names:
+                self._sessions.pop(name, None)
+            self._sessions.update(
+                (name, found) for name, found in read.items() if found is not None
+            )
+        try:
+            self._read_users()
+        finally:
+            with self._lock:
+                ended = [
+                    n for n, each in self._sessions.items() if not self._lasts(each)
+                ]
+                for name in ended:
                     del self._sessions[name]
+            for name in ended:
+                self._files.remove(name)
+
+    def _read_users(self) -> None:
+        stamp = _stamp(self._file.path)
+        if stamp != self._stamp:
+            self._stamp = stamp
+            users = self._file.read()
+            with self._lock:
+                self._users = users
 
     def _lasts(self, session: Session) -> bool:
         user = self._users.get(session.user)

@@ -134,6 +134,8 @@ class Security:
         self._app = app
         self._authenticate = settings.authenticate
         self._named = settings.people is not None
+        # One at a time, so that strangers keep no other thread busy.
+        self._signing_in = asyncio.Lock()
         self._access = AccessControl(settings)
         self._now = now
 
@@ -181,9 +183,11 @@ class Security:
             return refusal
         if self._named and _is_sign_in(request, scope):
             name, password, path = await _typed(receive)
-            return await asyncio.to_thread(
-                self._access.sign_in_user, request, name, password, path, self._now()
-            )
+            sign_in = self._access.sign_in_user
+            async with self._signing_in:
+                return await asyncio.to_thread(
+                    sign_in, request, name, password, path, self._now()
+                )
         if self._authenticate is None:
             return self._access.identify(request, self._now())
         viewer = self._authenticate(scope)
