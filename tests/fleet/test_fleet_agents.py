@@ -3,6 +3,7 @@
 import asyncio
 import socket
 import sys
+from types import SimpleNamespace as Namespace
 
 import msgspec
 import pytest
@@ -175,6 +176,24 @@ def test_a_robot_that_cannot_be_shown_leaves_the_others(shown):
         "Ann of the agent bay3 is not shown: 'ws://elsewhere' is not the rosbridge of "
         "the agent."
     ]
+
+
+def test_an_agent_with_other_robots_each_time_adds_two_per_second(shown, monkeypatch):
+    show, _, _ = shown
+    now, threads = [0.0], asyncio.to_thread
+
+    async def sleep(seconds):
+        now[0] += seconds
+
+    monkeypatch.setattr(remote_robots, "time", Namespace(monotonic=lambda: now[0]))
+    fake = Namespace(sleep=sleep, to_thread=threads)
+    monkeypatch.setattr(remote_robots, "asyncio", fake)
+    names = [f"r{number}" for number in range(MOST_ROBOTS + 40)]
+    show(*({"name": name} for name in names[:MOST_ROBOTS]))
+    assert now[0] == 0.0
+    robots = show(*({"name": name} for name in names[MOST_ROBOTS:]))
+    assert len(robots) == 40
+    assert now[0] == pytest.approx(20.0, rel=0.1)
 
 
 def test_every_display_has_the_same_name_for_a_robot(shown):

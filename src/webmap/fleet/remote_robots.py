@@ -17,6 +17,7 @@ from webmap.agents import address
 from webmap.agents.announcements import (
     MOST_GRIDS,
     MOST_OF_ABOUT,
+    MOST_ROBOTS,
     PROTOCOL,
     Beacon,
     read_about,
@@ -43,6 +44,7 @@ from webmap.fleet.robot_files import (
     config_from_agent,
     picture_from_agent,
 )
+from webmap.gate.lanes.budget import Budget
 from webmap.poses.alignment import align_bridge
 
 if TYPE_CHECKING:
@@ -73,6 +75,10 @@ ASKED = 10
 
 ASKED_WITHIN = 30.0
 """Seconds; an agent may change its description all the time."""
+
+NEW_ROBOTS = 2.0
+"""Robots per second that an agent may add after its first ``MOST_ROBOTS``: to add and
+remove robots costs the display and its pages time, and the names may change always."""
 
 MOST_PICTURES = 32
 """The greatest number of pictures of the robots of one agent."""
@@ -105,6 +111,10 @@ class RemoteAgent:
     alignment: tuple[float, float, float] = (0.0, 0.0, 0.0)
     asked: deque[float] = field(default_factory=lambda: deque(maxlen=ASKED))
     """When it was asked for its description, on the monotonic clock."""
+    new_robots: Budget = field(
+        default_factory=lambda: Budget(NEW_ROBOTS, burst=MOST_ROBOTS / NEW_ROBOTS)
+    )
+    """How many robots it may add."""
     describing: "asyncio.Task[None] | None" = None
     complaints: set[str] = field(default_factory=set)
     pictures: dict[str, str] = field(default_factory=dict)
@@ -288,6 +298,9 @@ class RemoteAgents:
         bridges = dict.fromkeys([*about.bridges, agent.bridge.url], agent.bridge)
         for id, config in there.items():
             try:
+                if id not in agent.robots:
+                    await asyncio.sleep(agent.new_robots.wait(time.monotonic()))
+                    agent.new_robots.spend(1, 0, 0.0, time.monotonic())
                 async with self._piece_of_work():
                     self._show(agent, id, config, bridges, console)
             except WebMapError as error:
