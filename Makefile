@@ -51,7 +51,7 @@ demo: $(INSTALLED)
 
 ## test: lint, types, contracts and the tests of every feature and promise, in ten minutes
 ## test-all: make test, and then make test-rest
-## test-rest: what make test leaves out: thorough tests, more trials of each fault, docs
+## test-rest: what make test leaves out: thorough tests, docs
 .PHONY: test test-all test-rest
 test: $(DEV) $(NODE)
 	@$(PY) tools/run_tests.py test

@@ -3,7 +3,7 @@
 The environment has ``ROBOTS``, the number of robots, and may have ``BRIDGE``, the
 address of a simulator with these robots, of which the last one is removed every two
 seconds; a new pose brings a removed robot back. Robots without a bridge get their
-poses here, and the state ``STATE``, if that is given.
+poses here, and the state ``STATE``, if that is given, and each page gets a notice.
 """
 
 import asyncio
@@ -15,6 +15,7 @@ import webmap
 from webmap.base.geometry import Quaternion, Vector3
 from webmap.console import open_console
 from webmap.core.robot_state import STATE_TEXTS, RobotState
+from webmap.core.runtime import runtime
 from webmap.poses.placing import PoseReading
 
 ROBOTS = int(os.environ["ROBOTS"])
@@ -66,6 +67,8 @@ class Strain:
         if Strain.task is None:
             work = give_poses() if BRIDGE is None else remove()
             Strain.task = asyncio.get_running_loop().create_task(work)
+        if given:
+            asyncio.get_running_loop().call_later(1.0, runtime.notice, "A notice.")
 
 
 console.add_module(Strain)

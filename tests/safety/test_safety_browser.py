@@ -12,7 +12,6 @@ pytestmark = [
     pytest.mark.safety,
     pytest.mark.browser,
     pytest.mark.serial,
-    pytest.mark.trials,
 ]
 
 PROMISED = 0.3

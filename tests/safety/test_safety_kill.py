@@ -106,7 +106,6 @@ def try_to_drive(driver):
     pass_time(0.4)
 
 
-@pytest.mark.trials
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("part", ["gate", "display", "both"])
 def test_after_a_kill_no_motion_resumes_and_an_acknowledged_stop_stays_active(

@@ -244,10 +244,12 @@ function mapOnScreen() {
 
 /** @param {Element} element */
 function isVisible(element) {
+  // A collapsed element has a size too. The size of what the browser leaves out
+  // because it is out of view costs a layout for each element.
+  const options = { visibilityProperty: true, contentVisibilityAuto: true };
+  if (element.checkVisibility?.(options) === false) return false;
   const { width, height } = element.getBoundingClientRect();
-  // A collapsed element has a size too.
-  const shown = element.checkVisibility?.({ visibilityProperty: true }) ?? true;
-  return shown && width > 0 && height > 0;
+  return width > 0 && height > 0;
 }
 
 const PROBLEM = "problem ";
