@@ -52,7 +52,7 @@ PAUSE = 5.0
 """Seconds until a source that has used up its lines may log one more."""
 
 MOST_SOURCES = 1000
-"""Most sources that are counted separately; a peer can invent names."""
+"""Most sources that are counted separately, by default."""
 
 MOST_LINES = 80
 """Lines of a traceback that are logged."""
@@ -72,11 +72,20 @@ class Budgets:
 
     Args:
         clock: A clock in seconds that never goes back.
+        pause: Seconds until a source that has used up its lines may log one more.
+        sources: Most sources that are counted separately; a peer can invent names.
 
     """
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self,
+        clock: Callable[[], float] = time.monotonic,
+        pause: float = PAUSE,
+        sources: int = MOST_SOURCES,
+    ) -> None:
         self._clock = clock
+        self._pause = pause
+        self._most = sources
         self._lock = threading.Lock()
         self._sources: dict[tuple[object, ...], _Budget] = {}
 
@@ -91,12 +100,12 @@ class Budgets:
         with self._lock:
             now = self._clock()
             source = (*place, about)
-            if source not in self._sources and len(self._sources) >= MOST_SOURCES:
+            if source not in self._sources and len(self._sources) >= self._most:
                 self._forget(now)
-                if len(self._sources) >= MOST_SOURCES:
+                if len(self._sources) >= self._most:
                     source = place
             budget = self._sources.setdefault(source, _Budget(at=now))
-            budget.lines = min(BURST, budget.lines + (now - budget.at) / PAUSE)
+            budget.lines = min(BURST, budget.lines + (now - budget.at) / self._pause)
             budget.at = now
             if budget.lines < 1:
                 budget.left_out += 1
@@ -105,7 +114,8 @@ class Budgets:
             suffix = f" ({budget.left_out} more were left out)" * (budget.left_out > 0)
             budget.left_out = 0
             if budget.lines < 1:
-                suffix += f" (similar lines are left out, except one every {PAUSE:g} s)"
+                rest = f"except one every {self._pause:g} s"
+                suffix += f" (similar lines are left out, {rest})"
             return suffix
 
     def clear(self) -> None:
@@ -115,7 +125,7 @@ class Budgets:
 
     def _forget(self, now: float) -> None:
         """Forget the sources that have all of their lines again."""
-        full = BURST * PAUSE
+        full = BURST * self._pause
         self._sources = {
             source: budget
             for source, budget in self._sources.items()
