@@ -49,7 +49,8 @@ def test_a_line_has_time_robot_person_and_facts(tmp_path, log):
     log.end()
     (file,) = (tmp_path / "shift-log").iterdir()
     line = msgspec.json.decode(file.read_bytes())
-    assert line.pop("time").startswith("20") and line.pop("unix") > 1e9
+    assert line.pop("time").startswith("20")
+    assert line.pop("unix") > 1e9
     assert line == {
         "kind": "stop",
         "text": "STOP",
@@ -90,7 +91,8 @@ def test_no_text_adds_a_line_or_has_a_control_character(tmp_path, log, text):
     log.end()
     (file,) = (tmp_path / "shift-log").iterdir()
     data = file.read_bytes()
-    assert data.count(b"\n") == 1 and len(data) < 4096
+    assert data.count(b"\n") == 1
+    assert len(data) < 4096
     (entry,) = written(tmp_path / "shift-log")
     fields = entry.text, entry.robot, entry.robot_name, entry.person, entry.place
     assert all(each.isprintable() for each in (*fields, entry.facts["fact"]))
@@ -109,7 +111,8 @@ def test_no_entry_has_a_token_or_the_password_of_an_address(log):
 def test_a_source_cannot_push_out_the_entries_of_others(log):
     ana, ben = Person("Ana", False, mark="a"), Person("Ben", False, mark="b")
     kept = [log.note("note", f"{i}", person=ana) for i in range(200)]
-    assert sum(kept) == 30 and not kept[-1]
+    assert sum(kept) == 30
+    assert not kept[-1]
     assert log.note("note", "hello", person=ben)
     assert "similar lines are left out" in log.entries()[29].text
 
@@ -184,7 +187,8 @@ def test_a_full_disk_loses_nothing_while_the_queue_has_room(tmp_path, monkeypatc
     wait_until(lambda: not log.trouble)
     log.end()
     texts = [entry.text for entry in written(tmp_path)]
-    assert texts[0] == "STOP" and texts[1].startswith("The log could not be written")
+    assert texts[0] == "STOP"
+    assert texts[1].startswith("The log could not be written")
     assert len(list(tmp_path.iterdir())) == 1  # no empty files of the failed tries
 
 
