@@ -19,6 +19,7 @@ from typing import Protocol
 
 from webmap.base.roles import Role
 from webmap.base.text import isolated
+from webmap.core.shift_log import shift_log
 from webmap.gate.protocol import Identity
 
 log = logging.getLogger("webmap.operators")
@@ -210,6 +211,7 @@ class Operators:
             now = self.of(viewer)
             if now != before:
                 log.info("%s is %s from now on", before.logged, now.logged)
+                shift_log.note("name", f"was {before.label} before", person=now)
         return ""
 
     def _settle(self, viewer: Viewer, known: _Known) -> None:

@@ -23,7 +23,11 @@ from webmap.base.scope import Removal
 from webmap.core.frame_pace import frame_pace
 from webmap.core.motion import RobotMotion, robot_motions
 from webmap.core.refusals import refusals
+from webmap.core.shift_events import ShiftWatch
+from webmap.core.shift_files import FOLDER
+from webmap.core.shift_log import shift_log
 from webmap.core.visible_robot import robots
+from webmap.gate.locks import state_folder
 from webmap.gate.protocol import (
     GateDown,
     Refused,
@@ -204,11 +208,16 @@ class Runtime:
     async def _run_model(self, ready: threading.Event) -> None:
         loop = self._loop = asyncio.get_running_loop()
         gate = self.gate = self.make_gate()
+        watch = ShiftWatch(shift_log)
 
         def pass_on(report: Report) -> None:
             loop.call_soon_threadsafe(self._on_report, report)
 
         gate.on_report(pass_on)
+        if not RobotMotion.agent:  # displays log what they do with an agent's robots
+            shift_log.begin(state_folder() / FOLDER)
+            shift_log.note("webmap", "WebMap started")
+            gate.on_report(watch.on_report)
         gate.start()
         try:
             lifecycle.begin(loop)
@@ -231,8 +240,11 @@ class Runtime:
             RobotMotion.gate = None
             await asyncio.to_thread(gate.stop)
             self.gate = None
+            watch.end()
+            shift_log.note("webmap", "WebMap ended")
             await lifecycle.end()
             await asyncio.to_thread(close_peers)
+            await asyncio.to_thread(shift_log.end)
 
     def _on_change(self) -> None:
         """Make frames soon: the first change since the last ones."""
@@ -270,6 +282,7 @@ class Runtime:
         if isinstance(report, RefusedCount):
             now = datetime.now(UTC)
             refusals.note(report.by, report.count, report.last, now)
+            shift_log.note("refused", report.last, person=report.by, count=report.count)
             return
         if isinstance(report, GateDown):
             for each in list(robots.values()):

@@ -21,7 +21,6 @@ import msgspec
 
 from webmap.base.logs import Budgets
 from webmap.base.text import one_line
-from webmap.core.operators import Operator
 from webmap.core.shift_files import LogFiles, read_newest
 from webmap.gate.protocol import Identity
 
@@ -62,6 +61,22 @@ class Named(Protocol):
     @property
     def name(self) -> str:
         """The name of the robot for people."""
+
+
+class KnownPerson(Protocol):
+    """An ``Operator``."""
+
+    @property
+    def label(self) -> str:
+        """The name and the place."""
+
+    @property
+    def person(self) -> str:
+        """The same whatever the name is."""
+
+    @property
+    def verified(self) -> bool:
+        """Whether a sign-in has verified the name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +156,7 @@ class ShiftLog:
         text: str,
         *,
         robot: Named | None = None,
-        person: Operator | Person | str | None = None,
+        person: KnownPerson | Person | str | None = None,
         **facts: Any,
     ) -> bool:
         """Add an entry; never blocks and never raises.
@@ -168,13 +183,17 @@ class ShiftLog:
         kind: str,
         text: str,
         robot: Named | None,
-        person: Operator | Person | str | None,
+        person: KnownPerson | Person | str | None,
         facts: dict[str, Any],
     ) -> bool:
-        if isinstance(person, Operator):
-            who = Person.of(person.label, _identity(person))
-        else:
-            who = person if isinstance(person, Person) else Person(person or "")
+        match person:
+            case Person():
+                who = person
+            case str() | None:
+                who = Person(person or "")
+            case _:
+                mark = Identity(person.person, verified=person.verified)
+                who = Person.of(person.label, mark)
         about = "" if robot is None else robot.id
         more = self._budgets.note((kind,), f"{about}\n{who.mark or who.name}")
         if more is None:
@@ -229,6 +248,8 @@ class ShiftLog:
             if self._thread is not None:
                 return
             self._ending = False
+            # The files have the rest, if this process began before.
+            self._shown = deque(self._queue, MOST_SHOWN)
             self._thread = threading.Thread(
                 target=self._write, args=(folder,), name="webmap-shift-log", daemon=True
             )
@@ -299,10 +320,6 @@ class ShiftLog:
         if isinstance(value, float):
             return round(value, 3) if math.isfinite(value) else None
         return self._plain(str(value), MOST_FACT)
-
-
-def _identity(person: Operator) -> Identity:
-    return Identity(person.person, verified=person.verified)
 
 
 def _utc(unix: float) -> str:

@@ -516,6 +516,25 @@ class GateDown(msgspec.Struct, frozen=True, tag="down"):
     """Whether one gate after the other ends, so that a person must find the cause."""
 
 
+class LeaseEnded(msgspec.Struct, frozen=True, tag="lease-ended"):
+    """Control of a robot has ended, other than by a release (made by the client)."""
+
+    robot: str
+    why: str
+
+
+class PageAsked(msgspec.Struct, frozen=True, tag="asked"):
+    """A page of this display asks to end a STOP or a goal (made by the client).
+
+    The next reports show whether it has ended.
+    """
+
+    robot: str
+    op: Literal["reset", "cancel"]
+    name: str
+    identity: Identity | None
+
+
 FromGate = (
     Ready
     | Hello
@@ -539,6 +558,8 @@ Report = (
     | SentTwist
     | SentGoal
     | SentPose
+    | LeaseEnded
+    | PageAsked
     | GateUp
     | GateDown
 )

@@ -16,6 +16,7 @@ from starlette.types import Receive, Scope, Send
 
 from webmap.core.base_page import PageEntry
 from webmap.core.page import Site
+from webmap.core.shift_log import shift_log
 from webmap.server.access import Settings
 from webmap.server.files import (
     FILES,
@@ -71,6 +72,7 @@ class WebApp:
         lifespan: Lifespan | None = None,
     ) -> None:
         self.settings = settings = settings or Settings()
+        shift_log.hide(settings.token)
         self.published = published or Published()
         self._gzip = GzipCache()
         calls = BatchedCallsByLoop()
@@ -129,6 +131,7 @@ class WebApp:
         if self.settings.people is not None:
             viewer = request.scope[VIEWER]
             log.info("%s signed out", viewer.operator.logged)
+            shift_log.note("sign-in", "signed out", person=viewer.operator)
             await asyncio.to_thread(self.settings.people.end, viewer.id)
             self._end_sockets()
         return Response(status_code=204)

@@ -179,6 +179,12 @@ class PageSocket:
         self._over = asyncio.Event()
         self._ended: tuple[int, str] | None = None
         self._gone = False
+        self._left = "the browser closed it"
+
+    @property
+    def cause(self) -> str:
+        """Why the socket has ended, as text for people."""
+        return self._left if self._ended is None else self._ended[1]
 
     def offer(self, item: bytes | str) -> None:
         """Send a message soon; callable from any thread."""
@@ -251,6 +257,7 @@ class PageSocket:
             message = await self._socket.receive()
             if message["type"] == "websocket.disconnect":
                 self._gone = True
+                self._left = message.get("reason") or self._left
                 # No page can send this code: its ping was not answered.
                 if message.get("code") == 1006 and message.get("reason"):
                     log.info("%s: closed, %s", self._name, message["reason"])

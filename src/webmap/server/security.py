@@ -19,6 +19,7 @@ from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from webmap.core.operators import Viewer
+from webmap.core.shift_log import Person, shift_log
 from webmap.server.access import (
     AccessControl,
     AccessRefusal,
@@ -152,6 +153,8 @@ class Security:
             scope[PAGE_KEY] = who.key
             send = with_headers(send, who.cookie)
             who = who.viewer
+            by, at = who.operator, request.address
+            shift_log.note("sign-in", "signed in", person=by, role=who.role, address=at)
         else:
             send = with_headers(send)
         if isinstance(who, Viewer):
@@ -163,6 +166,11 @@ class Security:
             await redirect(who)(scope, receive, send)
         else:
             _log_refusal(who, request, scope)
+            if request.tokens() or (self._named and _is_sign_in(request, scope)):
+                # Without what was typed: it may be a password in the wrong field.
+                source = Person("", mark=request.address)
+                text = f"a sign-in from {request.address} was refused"
+                shift_log.note("sign-in-failed", text, person=source, status=who.status)
             form = self._form(request, scope) if self._named else None
             answer = refuse(who, wants_html=request.wants_html, form=form)
             if connection_of(scope):

@@ -23,6 +23,7 @@ from webmap.base.roles import Role
 from webmap.core.base_page import PageEntry
 from webmap.core.operators import Viewer, operators
 from webmap.core.page import Site
+from webmap.core.shift_log import shift_log
 from webmap.gate.commands import Refusal as InvalidCommand
 from webmap.gate.commands import begins_like_stop, op_of, parse, stop_in
 from webmap.gate.display.pages import refused_text
@@ -230,6 +231,8 @@ class DriveSockets:
                 FAILED, "no connection to the gate; see the log of WebMap"
             )
             return
+        by = viewer.operator
+        shift_log.note("page", "opened a page", person=by, role=viewer.role)
         try:
             self._pages.drive_opened(page_id, viewer, connection)
 
@@ -259,6 +262,8 @@ class DriveSockets:
             # The gate first: the connection's leases end with it, and robots stop.
             connection.close()
             self._pages.drive_closed(page_id, viewer, connection)
+            text = f"left a page: {page_socket.cause}"
+            shift_log.note("page", text, person=viewer.operator)
 
     def _connect(
         self, page_socket: PageSocket, page_id: str, viewer: Viewer

@@ -11,6 +11,7 @@ from webmap.base.scope import Removable, Removal, keep
 from webmap.config.buttons import ButtonSpec, motion_of, value_kind
 from webmap.core.motion import robot_motions
 from webmap.core.operators import Operator
+from webmap.core.shift_log import shift_log
 from webmap.ros.bridge import Bridge
 from webmap.ros.definitions import Field
 from webmap.ros.message_forms import checked, fields_of
@@ -152,6 +153,9 @@ class RobotButton:
     def _become(self, state: State, words: str, by: Operator | str) -> None:
         self.state, self.result, self.by = state, words, by
         self.since = time.monotonic()
+        if state != "running":
+            text = f"{self.spec.label}: {words}"
+            shift_log.note("button", text, robot=self.robot, person=by)
         self.notify()
 
 

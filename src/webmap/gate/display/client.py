@@ -15,6 +15,7 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Iterator
+from typing import Literal
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
@@ -92,9 +93,7 @@ class GateClient:
     ) -> None:
         self._lock = threading.RLock()
         self._supervisor = link(self, self._lock)
-        self._pages = Pages(
-            self.send, self._lock, self._keep_stop_of_page, agent, prefix
-        )
+        self._pages = Pages(self.send, self._lock, self._heed, agent, prefix)
         self._program = ProgramCommands(
             self.send, self._lock, connection=f"{prefix}{protocol.PROGRAM}"
         )
@@ -266,6 +265,22 @@ class GateClient:
 
     # STOPs that no gate may have received.
 
+    def _heed(self, message: protocol.FromPage) -> None:
+        """Keep a page's STOP, and report who asks to end a STOP or a goal."""
+        self._keep_stop_of_page(message)
+        if not (b'"reset"' in message.text or b'"cancel"' in message.text):
+            return
+        try:
+            command = commands.parse(message.text)
+        except commands.Refusal:
+            return  # the gate refuses it, and counts it
+        if isinstance(command, commands.Reset | commands.Cancel):
+            op: Literal["reset", "cancel"] = (
+                "reset" if isinstance(command, commands.Reset) else "cancel"
+            )
+            who = self._pages.person(message.connection)
+            self._report(protocol.PageAsked(command.robot, op, *who))
+
     def _keep_stop_of_page(self, message: protocol.FromPage) -> None:
         """Keep a page's STOP, in case no gate receives it."""
         stop = stop_in(message.text)
@@ -311,8 +326,10 @@ class GateClient:
                 self._report(message)
             case protocol.Hello():
                 self._pages.on_hello(message)
-            case protocol.Refused(connection, what=what):
+            case protocol.Refused(connection, robot, what, why):
                 self._pages.on_refusal(message)
+                if what == "lease" and robot is not None:
+                    self._report(protocol.LeaseEnded(robot, why))
                 for_page = what == "move" and self._pages.knows(connection)
                 if for_page or connection == self._program.connection:
                     self._report(message)

@@ -258,6 +258,11 @@ class DriveConnection:
         """
         self._pages.move(self.id, robot, (x, y, yaw))
 
+    @property
+    def person(self) -> tuple[str, Identity | None]:
+        """The name and the identity of the person at the page."""
+        return self._hello.name, self._hello.identity
+
     def close(self) -> None:
         """Remove the page, which has closed; the robots that it drove stop."""
         self._pages.drop(self)
@@ -352,6 +357,11 @@ class Pages:
     def knows(self, id: str) -> bool:
         """Return whether there is a connection with this id."""
         return id in self._connections
+
+    def person(self, id: str) -> tuple[str, Identity | None]:
+        """Return the name and the identity of the person at a page."""
+        connection = self._connections.get(id)
+        return ("", None) if connection is None else connection.person
 
     def forward(self, id: str, data: bytes) -> None:
         """Pass a page's frame to the gate."""
