@@ -5,6 +5,7 @@ import weakref
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from webmap.features.alerts.alert_store import AlertKeeper
 from webmap.features.alerts.alerts import Alerts, AlertWatch
 
 if TYPE_CHECKING:
@@ -57,6 +58,17 @@ class Console:
         self.alerts = Alerts()
         """The alerts of all robots, shared by all pages."""
         self.alert_watch = AlertWatch(self.alerts, self.shown_robots)
+        self.alert_keeper: AlertKeeper | None = None
+
+    def keep_alerts(self, name: str) -> None:
+        """Watch the robots for alerts, and keep those of earlier starts.
+
+        Args:
+            name: The name of the file with the alerts.
+        """
+        self.alert_keeper = AlertKeeper(self.alerts, self.shown_robots, name)
+        self.alert_keeper.begin()
+        self.alert_watch.begin()
 
     def shown_robots(self) -> "list[Robot]":
         """Return the robots of both lists without those that were removed."""

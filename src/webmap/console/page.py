@@ -72,11 +72,11 @@ def open_console(
     plan = None if floor is None else load_floor(floor, _folder_for_this_process())
     fleet = [make_robot(config, bridges) for config in robots]
     opened = Console(fleet, layers_off)
-    opened.alert_watch.begin()
     if place is None:
         place = "\n".join(sorted(bridge.url for bridge in bridges))
     kept_under = f"console-{hashlib.sha256(place.encode()).hexdigest()[:16]}"
     opened.set_module("Labels", name=kept_under)
+    opened.keep_alerts(kept_under)
 
     @webmap.page("/", html="console.html", title=title)
     def console(page: "Page") -> None:

@@ -149,6 +149,13 @@ class Alerts:
             self._changed(alert)
         return alert is not None
 
+    def restore(self, earlier: Iterable[Alert]) -> None:
+        """Add the alerts of an earlier process, with ids of this one."""
+        for alert in list(earlier)[-MOST:]:
+            alert.id = next(self._ids)
+            self._newest[alert.robot, alert.kind] = self.listed[alert.id] = alert
+            self._changed(alert)
+
     def since(self, version: int) -> list[Alert]:
         """Return the alerts that changed after a version, the newest last."""
         return [each for each in self.listed.values() if each.version > version]
