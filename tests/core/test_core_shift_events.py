@@ -169,7 +169,7 @@ def test_stop_its_confirmation_and_its_reset_have_names(bench):
     stopped = report(state="stopped", latched=True, stop=stop)
     found = bench.texts(stopped, report(state="stopped", latched=True, stop=sure))
     assert [entry for entry in found if entry[0] == "stop"] == [
-        ("stop", "Ben", "STOP"),
+        ("stop", "Ben", "pressed STOP"),
         ("stop", "", "STOP confirmed: stopped"),
     ]
     asked = PageAsked("r1", "reset", ANA.name, ANA.identity)
@@ -180,8 +180,8 @@ def test_a_second_press_of_stop_is_another_entry(bench):
     one = StopReport("Ana", None, "", "1")
     two = StopReport("Ben", None, "", "2")
     assert bench.texts(report(), report(stop=one), report(stop=two)) == [
-        ("stop", "Ana", "STOP"),
-        ("stop", "Ben", "STOP"),
+        ("stop", "Ana", "pressed STOP"),
+        ("stop", "Ben", "pressed STOP"),
     ]
 
 

@@ -20,10 +20,12 @@ from webmap.console.operator_name import OperatorName
 from webmap.console.robot_card import RobotButtons, RobotCard
 from webmap.console.robot_list import RobotList
 from webmap.console.robot_looks import make_robot
+from webmap.console.shift import HAND_OVER, add_hand_over
 from webmap.features.alerts.alerts import AlertPanel
 from webmap.features.cameras.camera_panel import CameraPanel
 from webmap.features.doctor.doctor_panel import DoctorReports
 from webmap.features.selection.several_robots import SeveralRobots
+from webmap.features.shift_log.shift_panel import ShiftPanel
 
 if TYPE_CHECKING:
     from webmap import Bridge, Map, Page, RobotConfig
@@ -83,6 +85,7 @@ def open_console(
         build(page, bridges, opened, plan, title, kept_under)
         opened.opened(page)
 
+    add_hand_over(opened)
     return opened
 
 
@@ -116,6 +119,7 @@ def build(
     map.add_module("RouteTool", title)
     map.add_module("RosoutPanel", bridges)
     alerts = map.add_module(AlertPanel, opened.alerts)
+    shift = map.add_module(ShiftPanel, HAND_OVER)
     saving = {"place": ".tools", "classes": "webmap-button"}
     map.add_module("ExportTool", **saving)
     map.add_module(Layout, of=kept_under, **saving)
@@ -160,7 +164,7 @@ def build(
     refused = RefusedList(page.element("refused"), page.viewer.role)
     polls = [frame.place, listed.poll, card.poll, cameras.poll, health.poll]
     polls += [opened.bring_back, links.poll, refused.poll, doctor.poll, costmaps.poll]
-    polls += [alerts.poll, map.add_module(OperatorName).poll]
+    polls += [alerts.poll, shift.poll, map.add_module(OperatorName).poll]
     task = asyncio.get_running_loop().create_task(poll_on(polls))
     page.on_close(task.cancel)
 

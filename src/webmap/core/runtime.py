@@ -216,7 +216,7 @@ class Runtime:
         gate.on_report(pass_on)
         if not RobotMotion.agent:  # displays log what they do with an agent's robots
             shift_log.begin(state_folder() / FOLDER)
-            shift_log.note("webmap", "WebMap started")
+            shift_log.note("webmap", "WebMap started", event="started")
             gate.on_report(watch.on_report)
         gate.start()
         try:
@@ -238,10 +238,10 @@ class Runtime:
                 self._next_frames = None
             audience.end()
             RobotMotion.gate = None
+            watch.end()
             await asyncio.to_thread(gate.stop)
             self.gate = None
-            watch.end()
-            shift_log.note("webmap", "WebMap ended")
+            shift_log.note("webmap", "WebMap ended", event="ended")
             await lifecycle.end()
             await asyncio.to_thread(close_peers)
             await asyncio.to_thread(shift_log.end)

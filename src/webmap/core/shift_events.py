@@ -198,7 +198,7 @@ class RobotWatch:
         by = Person.of(stop.by, stop.identity)
         facts: dict[str, Any] = {"stop": stop.id}
         if before is None or before.id != stop.id:
-            text = "STOP is active from before" if old is None else "STOP"
+            text = "STOP is active from before" if old is None else "pressed STOP"
             if old is not None and old.state == "driving" and old.holder is not None:
                 facts["driver"] = old.holder.name
             yield Draft("stop", text, robot, by, facts)
@@ -278,9 +278,10 @@ class ShiftWatch:
             self._note(self._entries(report))
 
     def end(self) -> None:
-        """Note the drives that have not ended: WebMap ends."""
+        """Note the drives that have not ended: WebMap ends, and then the gate."""
         with self._lock:
             self._note(self._end_drives())
+            self._gate_is_down = True
 
     def _note(self, drafts: Iterator[Draft]) -> None:
         for kind, text, robot, person, facts in drafts:

@@ -3,6 +3,7 @@
 import asyncio
 import gzip
 import logging
+import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from pathlib import Path
@@ -16,6 +17,7 @@ from starlette.types import Receive, Scope, Send
 
 from webmap.core.base_page import PageEntry
 from webmap.core.page import Site
+from webmap.core.shift_choice import Choice, csv_of
 from webmap.core.shift_log import shift_log
 from webmap.server.access import Settings
 from webmap.server.files import (
@@ -86,6 +88,7 @@ class WebApp:
             WebSocketRoute("/_webmap/drive", drive.serve),
             Route("/_webmap/key", _key_fits, methods=["POST"]),
             Route("/_webmap/sign-out", self._sign_out, methods=["POST"]),
+            Route("/_webmap/shift-log.csv", _shift_log, methods=["POST"]),
             Route(FILES + "{name:path}", self._published_file),
             Route(IMAGES + "{tag}", self._published_image),
             Route("/_webmap/{name:path}", self._static),
@@ -153,6 +156,17 @@ async def _key_fits(request: Request) -> Response:
     """Answer a page whose socket was refused: its key is valid."""
     del request
     return Response(status_code=204)
+
+
+async def _shift_log(request: Request) -> Response:
+    """Answer with the chosen entries of the shift log; needs the key of a page."""
+    role = request.scope[VIEWER].role
+    choice = Choice.of(request.query_params)
+
+    def made() -> str:
+        return csv_of(choice.chosen(shift_log.entries(), role, time.time()))
+
+    return Response(await asyncio.to_thread(made), media_type="text/csv")
 
 
 @asynccontextmanager

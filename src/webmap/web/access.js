@@ -123,10 +123,18 @@ export async function signOut() {
   }
 }
 
-/** @param {string} path Below {@link BASE}. */
-function post(path) {
+/**
+ * Ask the server with the key of this page.
+ *
+ * @param {string} path Below {@link BASE}.
+ * @param {Record<string, string>} [query]
+ * @returns {Promise<Response>}
+ */
+export function post(path, query = {}) {
   const headers = key() ? { [KEY]: key() } : undefined;
-  return fetch(new URL(path, BASE), { method: "POST", headers });
+  const url = new URL(path, BASE);
+  url.search = new URLSearchParams(query).toString();
+  return fetch(url, { method: "POST", headers });
 }
 
 /**

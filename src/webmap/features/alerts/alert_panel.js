@@ -1,4 +1,12 @@
-import { button, html, onBeat, setHidden, setText, svg } from "../../web/tools/elements.js";
+import {
+  button,
+  clock,
+  html,
+  onBeat,
+  setHidden,
+  setText,
+  svg,
+} from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 import { foldedTool } from "../../web/tools/tool.js";
 import { Pace, Signals } from "./alert_signal.js";
@@ -255,21 +263,4 @@ class Row {
       this._act.setAttribute("aria-label", `Acknowledge ${name}: ${text}`);
     }
   }
-}
-
-/**
- * @param {number} time Unix seconds.
- * @param {boolean} [exact] Whether with seconds.
- * @returns {string} The time of day; with the date if it is not today.
- */
-function clock(time, exact = false) {
-  const date = new Date(time * 1000);
-  const two = /** @type {const} */ ("2-digit");
-  const shown = date.toLocaleTimeString("en-GB", {
-    hour: two,
-    minute: two,
-    second: exact ? two : undefined,
-  });
-  const today = date.toDateString() === new Date().toDateString();
-  return today ? shown : `${date.toLocaleDateString("en-CA")} ${shown}`;
 }

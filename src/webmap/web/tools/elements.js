@@ -354,3 +354,20 @@ export function nameSheet(map) {
 export function closeSheet() {
   byId("sheet").setAttribute("aria-expanded", "false");
 }
+
+/**
+ * @param {number} time Unix seconds.
+ * @param {boolean} [exact] Whether with seconds.
+ * @returns {string} The time of day; with the date if it is not today.
+ */
+export function clock(time, exact = false) {
+  const date = new Date(time * 1000);
+  const two = /** @type {const} */ ("2-digit");
+  const shown = date.toLocaleTimeString("en-GB", {
+    hour: two,
+    minute: two,
+    second: exact ? two : undefined,
+  });
+  const today = date.toDateString() === new Date().toDateString();
+  return today ? shown : `${date.toLocaleDateString("en-CA")} ${shown}`;
+}

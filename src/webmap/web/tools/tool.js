@@ -14,6 +14,7 @@ const SYMBOLS = {
   log: "M4 5h16M4 10h16M4 15h10M4 20h7",
   measure: "M3 15.5L15.5 3 21 8.5 8.5 21zM7 11.5l2 2M10.5 8l2 2M14 4.5l2 2",
   route: "M6 19.5a2.5 2.5 0 1 0 .01 0zM6 17h8a3.5 3.5 0 0 0 0-7h-4a3.5 3.5 0 0 1 0-7h8",
+  shift: "M9 3.5h6v3.5H9zM9 5H5v16h14V5h-4M8.5 11.5h7M8.5 16h5",
 };
 
 /** @typedef {keyof typeof SYMBOLS} Symbol */
