@@ -21,6 +21,7 @@ COMMANDS = {
     "demo": "webmap.cli.demo:demo",
     "discover": "webmap.cli.discover:discover",
     "doctor": "webmap.cli.doctor:doctor",
+    "log": "webmap.cli.log:log",
     "play": "webmap.cli.play:play",
     "record": "webmap.cli.record:record",
     "router": "webmap.cli.agent:router",

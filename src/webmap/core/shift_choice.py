@@ -32,6 +32,10 @@ KINDS = {
 }
 """The kinds of entries with their names for people; other kinds are their own name."""
 
+ALL, PAGE = "all", "page"
+"""The choice of all kinds, and the kind that is left out otherwise: each page that is
+opened and left has an entry."""
+
 FOR_ADMINS = frozenset({"sign-in", "sign-in-failed", "refused"})
 """Kinds that only admins see."""
 
@@ -56,6 +60,7 @@ class Choice:
     """The id of a robot."""
     person: str = ""
     kind: str = ""
+    """A kind, or :data:`ALL`; empty for all but :data:`PAGE`."""
 
     @classmethod
     def of(cls, values: Mapping[str, object]) -> "Choice":
@@ -79,8 +84,11 @@ class Choice:
             may_see(entry, role)
             and self.robot in ("", entry.robot)
             and self.person in ("", entry.person)
-            and self.kind in ("", entry.kind)
+            and (self.kind in (ALL, entry.kind) or self._is_usual(entry))
         )
+
+    def _is_usual(self, entry: Entry) -> bool:
+        return not self.kind and entry.kind != PAGE
 
     def chosen(self, entries: Sequence[Entry], role: Role, now: float) -> list[Entry]:
         """Return the chosen entries, the oldest first."""

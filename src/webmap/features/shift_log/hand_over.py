@@ -135,7 +135,9 @@ class HandOver:
     ) -> None:
         head = html.tr(*(html.th(text=column, scope="col") for column in columns))
         part = html.section(html.h2(text=f"{title} ({len(rows)})"))
-        if rows:
+        if not rows:
+            part.append(html.p(text="None."))
+        else:
             body = html.tbody(
                 *(
                     html.tr(*(html.td(text=cell) for cell in row))

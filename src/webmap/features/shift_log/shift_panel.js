@@ -63,7 +63,7 @@ class ShiftPanel {
     this._since = choice(Object.entries(SINCE), kept.since, show);
     this._robot = choice([["", "All robots"]], "", show);
     this._person = choice([["", "Everybody"]], "", show);
-    this._kind = choice([["", "All kinds"]], "", show);
+    this._kind = choice([["", "All but pages"]], "", show);
     this._trouble = html("p", "webmap-problem", { role: "status" });
     this._count = html("p", "webmap-muted webmap-shift-count", { role: "status" });
     this._stated = html("p", "webmap-muted", {}, "* This name is not verified.");
@@ -75,15 +75,7 @@ class ShiftPanel {
       "Shift log",
       { "data-webmap-menu": "" },
       this._trouble,
-      html(
-        "div",
-        "webmap-shift-choices",
-        {},
-        named("Since", this._since),
-        named("Robot", this._robot),
-        named("Person", this._person),
-        named("Kind", this._kind),
-      ),
+      this._filter(),
       ...(options.may ? this._noteForm() : []),
       html(
         "div",
@@ -117,7 +109,7 @@ class ShiftPanel {
       fill(this._robot, message.robots, kept.robot);
       fill(this._person, message.people.map(twice), kept.person);
       const kinds = message.has.map((/** @type {string} */ kind) => [kind, this._name(kind)]);
-      fill(this._kind, kinds, kept.kind);
+      fill(this._kind, [["all", "All kinds"], ...kinds], kept.kind);
       this._list.replaceChildren();
     } else this._total += message.new.length;
     const lines = (message.all ?? message.new).map((/** @type {Row} */ row) => this._line(row));
@@ -139,6 +131,23 @@ class ShiftPanel {
     if (!this._note) return;
     const robot = this._robot.selectedOptions[0];
     this._note.placeholder = robot?.value ? `About ${robot.text}` : "For the next shift";
+  }
+
+  _filter() {
+    const choices = html(
+      "div",
+      "webmap-shift-choices",
+      {},
+      named("Since", this._since),
+      named("Robot", this._robot),
+      named("Person", this._person),
+      named("Kind", this._kind),
+    );
+    const summary = html("summary", "", {}, "Filter");
+    const filter = html("details", "webmap-shift-filter", {}, summary, choices);
+    // A small page has room for the choices or for the entries.
+    filter.open = innerHeight >= 700 && innerWidth > 640;
+    return filter;
   }
 
   /** @returns {Node[]} */
@@ -251,5 +260,6 @@ function fill(select, options, value) {
  * @param {HTMLElement} field
  */
 function named(name, field) {
+  field.setAttribute("aria-label", name);
   return html("label", "", {}, html("span", "webmap-muted", {}, name), field);
 }

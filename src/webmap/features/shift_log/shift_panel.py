@@ -45,6 +45,8 @@ class ShiftPanel:
         self._choice: Choice | None = None
         """What the page shows; None while the panel is folded."""
         self._sent = 0, 0, ""
+        self._offered: set[str] = set()
+        """The robots, people and kinds that the page can choose."""
         self.browser_part = map.add_browser_part(
             self,
             "features/shift_log/shift_panel.js",
@@ -78,11 +80,13 @@ class ShiftPanel:
         total, restored, trouble = _state()
         if self._choice is None or self._sent == (total, restored, trouble):
             return
-        if restored != self._sent[1]:
+        new, role = shift_log.since(self._sent[0]), self._viewer.role
+        names = {
+            name for entry in new if may_see(entry, role) for name in _names(entry)
+        }
+        if restored != self._sent[1] or not names <= self._offered:
             self._send_all()
             return
-        new = shift_log.since(self._sent[0])
-        role = self._viewer.role
         chosen = [entry for entry in new if self._choice.has(entry, role)]
         self._send({"new": _rows(chosen)})
 
@@ -93,6 +97,7 @@ class ShiftPanel:
         chosen = self._choice.chosen(entries, role, time.time())
         seen = [entry for entry in entries if may_see(entry, role)]
         robots = {e.robot: e.robot_name for e in seen if e.robot}
+        self._offered = {name for entry in seen for name in _names(entry)}
         self._send(
             {
                 "all": _rows(chosen[-MOST_ROWS:]),
@@ -134,6 +139,10 @@ class ShiftPanel:
 
 def _shifts() -> Iterable[Entry]:
     return (entry for entry in shift_log.entries() if entry.kind == "shift")
+
+
+def _names(entry: Entry) -> tuple[str, ...]:
+    return entry.robot, entry.person, entry.kind
 
 
 def _state() -> tuple[int, int, str]:
