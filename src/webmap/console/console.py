@@ -6,7 +6,8 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from webmap.features.alerts.alert_store import AlertKeeper
-from webmap.features.alerts.alerts import Alerts, AlertWatch
+from webmap.features.alerts.alerts import Alerts, AlertWatch, conditions
+from webmap.features.shift_log.hand_over import OpenAlert, RobotNow
 
 if TYPE_CHECKING:
     from webmap import Bridge, Page, Robot
@@ -16,6 +17,9 @@ Factory: TypeAlias = str | Callable[..., Any]
 
 TOP = 10.0
 """Order of the first map: above maps from files, below costmaps and robots."""
+
+OUT = ("disobeys", "bridge", "lost", "commands", "health")
+"""The kinds of alerts with which a robot is out of service, besides an active STOP."""
 
 
 class Console:
@@ -226,3 +230,30 @@ def _add_module(
             map.add_module(name, *args, **options)
         except ValueError as error:  # the file no longer exists
             map.report_error(f"{name} is not shown: {error}")
+
+
+def robot_now(robot: "Robot") -> RobotNow:
+    """Return a robot with the reason why it is out of service, if it is."""
+    texts = conditions(robot)
+    why = [texts[kind] for kind in OUT if kind in texts]
+    report = robot.report
+    if report is not None and report.stop is not None:
+        why.insert(0, f"STOP active, pressed by {report.stop.by}")
+    bridge = robot.pose_source.bridge
+    name = "" if bridge is None else bridge.name or bridge.url
+    return RobotNow(robot.id, robot.name, name, "; ".join(why))
+
+
+def open_alerts(opened: Console) -> list[OpenAlert]:
+    """Return the alerts that are active, or that nobody has acknowledged."""
+    return [
+        OpenAlert(
+            alert.began,
+            alert.name,
+            alert.text,
+            alert.ended is not None,
+            "" if alert.by is None else str(alert.by),
+        )
+        for alert in opened.alerts.listed.values()
+        if alert.ended is None or alert.by is None
+    ]

@@ -14,17 +14,17 @@ import webmap
 from webmap.base.map_file import cell_at
 from webmap.console.bar import BridgeList, RefusedList
 from webmap.console.card_parts import RobotHealth
-from webmap.console.console import Console
+from webmap.console.console import Console, open_alerts, robot_now
 from webmap.console.floor import Floor, load_floor
 from webmap.console.operator_name import OperatorName
 from webmap.console.robot_card import RobotButtons, RobotCard
 from webmap.console.robot_list import RobotList
 from webmap.console.robot_looks import make_robot
-from webmap.console.shift import HAND_OVER, add_hand_over
 from webmap.features.alerts.alerts import AlertPanel
 from webmap.features.cameras.camera_panel import CameraPanel
 from webmap.features.doctor.doctor_panel import DoctorReports
 from webmap.features.selection.several_robots import SeveralRobots
+from webmap.features.shift_log.hand_over import HTML, HandOver
 from webmap.features.shift_log.shift_panel import ShiftPanel
 
 if TYPE_CHECKING:
@@ -38,6 +38,9 @@ PRODUCT = "WebMap"
 SPEED = 1.0
 ROTATION_SPEED = 1.5
 """Greatest speeds for keys, in m/s and rad/s; each robot's limits apply too."""
+
+HAND_OVER = "/hand-over"
+"""The path of the page that hands over a shift."""
 
 PERIOD = 0.25
 """Seconds between two updates of values without a trigger: ages and connections."""
@@ -85,7 +88,14 @@ def open_console(
         build(page, bridges, opened, plan, title, kept_under)
         opened.opened(page)
 
-    add_hand_over(opened)
+    @webmap.page(HAND_OVER, html=HTML)
+    def hand_over(page: "Page") -> None:
+        HandOver(
+            page,
+            lambda: [robot_now(robot) for robot in opened.shown_robots()],
+            lambda: open_alerts(opened),
+        )
+
     return opened
 
 
