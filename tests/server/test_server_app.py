@@ -11,6 +11,7 @@ from starlette.websockets import WebSocketDisconnect
 from equipment.server_fakes import TOKEN, FakePage, key_in
 from webmap.core.operators import Viewer
 from webmap.core.pictures import pictures
+from webmap.core.shift_log import shift_log
 from webmap.server.access import Settings
 from webmap.server.app import WebApp
 from webmap.server.auth import Token
@@ -429,6 +430,27 @@ def test_a_page_can_ask_why_its_socket_was_refused(client):
     answer = client.post(ask, headers=ORIGIN)
     assert answer.status_code == 401
     assert "Open the address that WebMap printed" in answer.text
+
+
+def test_the_shift_log_as_csv_needs_the_key_of_a_page(client, stranger):
+    path = "/_webmap/shift-log.csv?since=all&kind=all"
+    shift_log.note("note", f"=1+1 {TOKEN}")
+    answer = client.post(path, headers=ORIGIN)
+    assert answer.headers["content-type"].startswith("text/csv")
+    assert "'=1+1" in answer.text
+    assert ",sign-in," in answer.text  # of this client, who is an admin
+    assert TOKEN not in answer.text
+    assert client.get(path).status_code == 404
+    del client.headers["webmap-key"]  # another port of this host gets the cookie
+    assert client.post(path, headers=ORIGIN).status_code == 401
+
+
+def test_a_wrong_token_is_noted_without_the_token(stranger):
+    before = shift_log.total
+    stranger.get("/?token=canary-of-a-token")
+    (entry,) = shift_log.since(before)
+    assert (entry.kind, entry.facts["status"]) == ("sign-in-failed", 401)
+    assert "canary" not in str(entry)
 
 
 def test_a_request_without_sign_in_cannot_add_its_own_lines_to_the_log(
