@@ -170,7 +170,7 @@ def test_stop_its_confirmation_and_its_reset_have_names(bench):
     found = bench.texts(stopped, report(state="stopped", latched=True, stop=sure))
     assert [entry for entry in found if entry[0] == "stop"] == [
         ("stop", "Ben", "pressed STOP"),
-        ("stop", "", "STOP confirmed: stopped"),
+        ("stop", "", "stopped"),
     ]
     asked = PageAsked("r1", "reset", ANA.name, ANA.identity)
     assert bench.texts(asked, report()) == [("reset", "Ana", "reset STOP")]

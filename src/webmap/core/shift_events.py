@@ -205,7 +205,7 @@ class RobotWatch:
         elif before.confirmed == stop.confirmed:
             return
         if stop.confirmed is not None:
-            text = f"STOP {'' if stop.confirmed else 'not '}confirmed: {stop.why}"
+            text = stop.why if stop.confirmed else f"not confirmed: {stop.why}"
             facts = {"stop": stop.id, "confirmed": stop.confirmed}
             yield Draft("stop", text, robot, None, facts)
 

@@ -49,13 +49,17 @@ def stops_of(entries: Iterable[Entry]) -> list[Stop]:
 
 
 def driving_of(entries: Iterable[Entry]) -> dict[tuple[str, str], Driving]:
-    """Return the sums of all drives, by the names of robot and person."""
+    """Return the sums of all drives, by the names of robot and person.
+
+    A name that is not verified ends with an asterisk.
+    """
     found: dict[tuple[str, str], Driving] = {}
     for entry in entries:
         facts = entry.facts
         if entry.kind != "drive" or "distance_m" not in facts:
             continue
-        drive = found.setdefault((entry.robot_name, entry.person), Driving())
+        person = f"{entry.person}{'*' if entry.verified is False else ''}"
+        drive = found.setdefault((entry.robot_name, person), Driving())
         drive.metres += _number(facts.get("distance_m"))
         drive.seconds += _number(facts.get("seconds"))
         drive.top = max(drive.top, _number(facts.get("top_m_s")))
