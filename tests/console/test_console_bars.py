@@ -363,7 +363,7 @@ def test_the_tools_that_have_no_room_are_in_more(page):
     expect(more).to_be_hidden()
     page.evaluate(OPEN["camera"])
     resize(page, (1024, 600))
-    log = tools.locator("summary", has_text="Log")
+    log = tools.locator("summary[title=Log]")
     expect(log).to_be_hidden()
     more.click()
     expect(more).to_have_attribute("aria-expanded", "true")

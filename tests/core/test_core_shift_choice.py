@@ -13,7 +13,7 @@ from webmap.core.shift_choice import (
     csv_of,
     shift_began,
 )
-from webmap.core.shift_log import Entry
+from webmap.core.shift_files import Entry
 
 NOW = 1_000_000.0
 

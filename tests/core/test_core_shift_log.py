@@ -17,16 +17,17 @@ from webmap.core.shift_files import (
     MOST_FILES,
     OLDEST,
     Bounds,
+    Entry,
     LogFiles,
     read_newest,
 )
-from webmap.core.shift_log import MOST_QUEUED, Entry, Person, RobotName, ShiftLog
+from webmap.core.shift_log import MOST_QUEUED, Person, RobotName, ShiftLog
 
 BOB = RobotName("r1", "Bob")
 
 
 def written(folder: Path) -> list[Entry]:
-    return read_newest(folder, 10_000, Entry)
+    return read_newest(folder, 10_000)
 
 
 def wait_until(condition, seconds=5.0):

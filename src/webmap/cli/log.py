@@ -30,10 +30,9 @@ def log(since: str, kind: str, robot: str, as_csv: bool) -> None:
     """Print the shift log of this machine's user, the newest entry last."""
     from webmap.core.shift_choice import Choice, csv_of
     from webmap.core.shift_files import FOLDER, read_newest
-    from webmap.core.shift_log import Entry
 
     begins, choice = time.time() - _seconds(since), Choice(kind=kind)
-    found = read_newest(state_folder() / FOLDER, 1_000_000, Entry, begins)
+    found = read_newest(state_folder() / FOLDER, 1_000_000, begins)
     chosen = [
         entry
         for entry in found

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from webmap.features.alerts.alert_store import AlertKeeper
 from webmap.features.alerts.alerts import Alerts, AlertWatch, conditions
-from webmap.features.shift_log.hand_over import OpenAlert, RobotNow
+from webmap.features.shift_log.hand_over import RobotNow
 
 if TYPE_CHECKING:
     from webmap import Bridge, Page, Robot
@@ -242,18 +242,3 @@ def robot_now(robot: "Robot") -> RobotNow:
     bridge = robot.pose_source.bridge
     name = "" if bridge is None else bridge.name or bridge.url
     return RobotNow(robot.id, robot.name, name, "; ".join(why))
-
-
-def open_alerts(opened: Console) -> list[OpenAlert]:
-    """Return the alerts that are active, or that nobody has acknowledged."""
-    return [
-        OpenAlert(
-            alert.began,
-            alert.name,
-            alert.text,
-            alert.ended is not None,
-            "" if alert.by is None else str(alert.by),
-        )
-        for alert in opened.alerts.listed.values()
-        if alert.ended is None or alert.by is None
-    ]

@@ -14,7 +14,7 @@ import webmap
 from webmap.base.map_file import cell_at
 from webmap.console.bar import BridgeList, RefusedList
 from webmap.console.card_parts import RobotHealth
-from webmap.console.console import Console, open_alerts, robot_now
+from webmap.console.console import Console, robot_now
 from webmap.console.floor import Floor, load_floor
 from webmap.console.operator_name import OperatorName
 from webmap.console.robot_card import RobotButtons, RobotCard
@@ -93,7 +93,7 @@ def open_console(
         HandOver(
             page,
             lambda: [robot_now(robot) for robot in opened.shown_robots()],
-            lambda: open_alerts(opened),
+            opened.alerts.listed.values,
         )
 
     return opened

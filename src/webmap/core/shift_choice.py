@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from webmap.base.roles import Role
-from webmap.core.shift_log import Entry
+from webmap.core.shift_files import Entry
 
 KINDS = {
     "stop": "STOP",

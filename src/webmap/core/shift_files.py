@@ -11,14 +11,12 @@ import time
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeAlias
 
 import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.base.plain_files import open_regular, read_file
-
-T = TypeVar("T")
 
 FOLDER = "shift-log"
 """The folder in the folder for state."""
@@ -36,6 +34,30 @@ OLDEST = 90 * 24 * 3600.0
 """Seconds after its last line when a file is removed."""
 
 MOST_FILES = 1000
+
+
+Fact: TypeAlias = str | int | float | bool | None
+
+
+class Entry(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One line of the log."""
+
+    time: str
+    """In UTC, such as ``2026-11-29T08:14:02.113Z``."""
+    unix: float
+    """The same time in seconds since 1970."""
+    kind: str
+    """What happened: such as ``"stop"``."""
+    text: str
+    robot: str = ""
+    """The id of the robot, if the entry is about one."""
+    robot_name: str = ""
+    person: str = ""
+    """Who did it: a person, a program, or nobody."""
+    verified: bool | None = None
+    """Whether a sign-in has verified the name; None for a program."""
+    place: str = ""
+    facts: dict[str, Fact] = {}
 
 
 class Bounds:
@@ -149,7 +171,7 @@ def _listed(folder: Path) -> list[tuple[str, int, float]]:
     return found
 
 
-def read_newest(folder: Path, most: int, of: type[T], since: float = 0.0) -> list[T]:
+def read_newest(folder: Path, most: int, since: float = 0.0) -> list[Entry]:
     """Return the newest lines of all files, the oldest first.
 
     Lines and files that cannot be read are left out: another process may be writing,
@@ -158,12 +180,11 @@ def read_newest(folder: Path, most: int, of: type[T], since: float = 0.0) -> lis
     Args:
         folder: The folder.
         most: The greatest number of lines.
-        of: The type of a line; has a field ``unix``.
         since: Seconds since 1970; files that ended before are not read.
 
     """
-    decode = msgspec.json.Decoder(of).decode
-    found: list[T] = []
+    decode = msgspec.json.Decoder(Entry).decode
+    found: list[Entry] = []
     for name, _, changed in sorted(_listed(folder), reverse=True):
         if len(found) >= most or changed < since:
             continue
@@ -177,5 +198,5 @@ def read_newest(folder: Path, most: int, of: type[T], since: float = 0.0) -> lis
             except (msgspec.DecodeError, UnicodeDecodeError):
                 continue
         time.sleep(0)  # other threads of the process run between two files
-    found.sort(key=lambda entry: entry.unix)  # type: ignore[attr-defined]
+    found.sort(key=lambda entry: entry.unix)
     return found[-most:]

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias
+from typing import Any
 
 import msgspec
 
 from webmap.base.logs import Budgets
 from webmap.base.text import one_line
-from webmap.core.shift_files import LogFiles, read_newest
+from webmap.core.shift_files import Entry, Fact, LogFiles, read_newest
 from webmap.gate.protocol import Identity
 
 log = logging.getLogger("webmap")
@@ -47,36 +47,6 @@ _GOODBYE_S = 2.0
 
 _SECRETS = re.compile(r"(?<=://)[^/@\s]+(?=@)|(?<=token=)[^&\s]+|(?<=code=)[^&\s]+")
 """Users and passwords of addresses, and what signs in by an address."""
-
-Fact: TypeAlias = str | int | float | bool | None
-
-
-class Named(Protocol):
-    """A robot."""
-
-    @property
-    def id(self) -> str:
-        """The identifier of the robot."""
-
-    @property
-    def name(self) -> str:
-        """The name of the robot for people."""
-
-
-class KnownPerson(Protocol):
-    """An ``Operator``."""
-
-    @property
-    def label(self) -> str:
-        """The name and the place."""
-
-    @property
-    def person(self) -> str:
-        """The same whatever the name is."""
-
-    @property
-    def verified(self) -> bool:
-        """Whether a sign-in has verified the name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,27 +79,6 @@ class Person:
         return cls(name or label, identity.verified, place, identity.person)
 
 
-class Entry(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """One line of the log."""
-
-    time: str
-    """In UTC, such as ``2026-11-29T08:14:02.113Z``."""
-    unix: float
-    """The same time in seconds since 1970."""
-    kind: str
-    """What happened: such as ``"stop"``."""
-    text: str
-    robot: str = ""
-    """The id of the robot, if the entry is about one."""
-    robot_name: str = ""
-    person: str = ""
-    """Who did it: a person, a program, or nobody."""
-    verified: bool | None = None
-    """Whether a sign-in has verified the name; None for a program."""
-    place: str = ""
-    facts: dict[str, Fact] = {}
-
-
 class ShiftLog:
     """The log of this process; every method may be called from any thread."""
 
@@ -155,8 +104,8 @@ class ShiftLog:
         kind: str,
         text: str,
         *,
-        robot: Named | None = None,
-        person: KnownPerson | Person | str | None = None,
+        robot: Any = None,
+        person: Any = None,
         **facts: Any,
     ) -> bool:
         """Add an entry; never blocks and never raises.
@@ -164,8 +113,9 @@ class ShiftLog:
         Args:
             kind: What happened, as a word: ``"stop"``.
             text: The same as a sentence for people, without the name of the robot.
-            robot: The robot, if the entry is about one.
-            person: Who did it: a person, or the name of a program.
+            robot: An object with the ``id`` and the ``name`` of a robot, or None.
+            person: Who did it: an ``Operator``, a :class:`Person`, the name of a
+                program, or None.
             **facts: Numbers and short texts.
 
         Returns:
@@ -182,8 +132,8 @@ class ShiftLog:
         self,
         kind: str,
         text: str,
-        robot: Named | None,
-        person: KnownPerson | Person | str | None,
+        robot: Any,
+        person: Any,
         facts: dict[str, Any],
     ) -> bool:
         match person:
@@ -299,7 +249,7 @@ class ShiftLog:
 
     def _show_earlier(self, folder: Path) -> None:
         try:
-            earlier = read_newest(folder, MOST_SHOWN, Entry)
+            earlier = read_newest(folder, MOST_SHOWN)
         except Exception as error:
             log.warning("the shift log cannot be read: %s", error)
             return

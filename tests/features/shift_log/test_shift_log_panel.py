@@ -14,7 +14,7 @@ from webmap.core.page import Page
 from webmap.core.shift_log import RobotName, ShiftLog
 from webmap.core.world_view import least_role
 from webmap.features.shift_log import hand_over, shift_panel
-from webmap.features.shift_log.hand_over import HandOver, OpenAlert, RobotNow
+from webmap.features.shift_log.hand_over import HandOver, RobotNow
 from webmap.features.shift_log.shift_panel import LONGEST_NOTE, MOST_ROWS, ShiftPanel
 from webmap.scene.node import Text
 
@@ -147,11 +147,9 @@ def test_too_many_notes_of_one_person_are_refused_in_a_sentence(open_page):
     assert "Too many notes" in ann.got[-1]["problem"]
 
 
-def test_a_shift_is_handed_over_once_in_half_an_hour(open_page, log):
-    ann = open_page()
-    for _ in range(3):
-        ann.panel.on_message({"shift": True})
-    assert [entry.kind for entry in log.entries()] == ["shift"]
+def test_a_hand_over_is_noted(open_page, log):
+    open_page().panel.on_message({"shift": True})
+    assert [(e.kind, e.person) for e in log.entries()] == [("shift", "Ann")]
 
 
 def test_the_panel_shows_that_the_log_cannot_be_written(open_page, log):
@@ -178,16 +176,21 @@ def test_the_hand_over_has_each_part(open_page, log):
     log.note("refused", "canary")
     facts = {"distance_m": 12.4, "seconds": 90.0, "top_m_s": 0.5, "age_p50_ms": 40}
     log.note("drive", "drove", robot=BOB, person="Ana", age_p99_ms=95, **facts)
+    alert = SimpleNamespace(began=100.0, ended=None, name="Bob", by=None)
+    alert.text = "Battery at 9 %"
+    over = SimpleNamespace(**{**vars(alert), "text": "No pose", "ended": 200.0})
+    seen = SimpleNamespace(**{**vars(over), "text": "canary", "by": "Ana"})
     HandOver(
         ann.page,
         lambda: [RobotNow("r1", "Bob", "hall", "STOP active, pressed by Ana")],
-        lambda: [OpenAlert(100.0, "Bob", "Battery at 9 %", over=True, by="")],
+        lambda: [alert, over, seen],
     )
     text = texts_of(ann.page.element("sheet"))
     for part in (
         "Robots out of service (1)",
         "STOP active, pressed by Ana",
-        "Battery at 9 % (over)",
+        "Battery at 9 %",
+        "No pose (over)",
         "Stops (1)",
         "the door is blocked",
         "12 m",

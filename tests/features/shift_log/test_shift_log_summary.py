@@ -2,7 +2,7 @@
 
 import pytest
 
-from webmap.core.shift_log import Entry
+from webmap.core.shift_files import Entry
 from webmap.features.shift_log.shift_summary import (
     driving_of,
     running,

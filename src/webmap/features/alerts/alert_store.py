@@ -3,7 +3,6 @@
 import asyncio
 import logging
 from collections.abc import Callable, Iterable, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -24,38 +23,6 @@ LARGEST = 1 << 20
 """Most bytes of the file."""
 
 
-class AlertStore:
-    """A file with the alerts of one console.
-
-    Args:
-        folder: The folder of such files.
-        name: The name of the file.
-    """
-
-    def __init__(self, folder: Path, name: str) -> None:
-        self.file = folder / f"{name}.json"
-
-    def load(self) -> Sequence[Alert]:
-        """Return the alerts of the file; none if it is missing or damaged."""
-        try:
-            data = read_file(self.file, LARGEST, links=False)
-            return msgspec.json.decode(data, type=list[Alert])
-        except FileNotFoundError:
-            return ()
-        except (OSError, ConfigError, msgspec.DecodeError, UnicodeDecodeError) as error:
-            log.warning("%s cannot be read: %s", self.file, error)
-            shift_log.note("log", f"The earlier alerts cannot be read: {error}")
-            return ()
-
-    def save(self, data: bytes) -> None:
-        """Replace the content of the file.
-
-        Raises:
-            OSError: If that is not possible; the file is then as before.
-        """
-        write_file(self.file, data)
-
-
 class AlertKeeper:
     """Keeps the alerts on disk, and notes in the shift log what becomes of them.
 
@@ -70,10 +37,10 @@ class AlertKeeper:
     ) -> None:
         self._alerts = alerts
         self._robots = robots
-        self._store = AlertStore(state_folder() / "alerts", name)
+        self._file = state_folder() / "alerts" / f"{name}.json"
         self._trouble = ""
         self._task: asyncio.Task[None] | None = None
-        alerts.restore(self._store.load())
+        alerts.restore(self._load())
         self._version = alerts.version
         self._seen = {id: _state(each) for id, each in alerts.listed.items()}
 
@@ -101,12 +68,23 @@ class AlertKeeper:
         self._note(alerts)
         data = msgspec.json.encode(alerts)
         try:
-            await asyncio.to_thread(self._store.save, data)
+            await asyncio.to_thread(write_file, self._file, data)
             self._trouble = ""
         except OSError as error:
             if str(error) != self._trouble:
                 self._trouble = str(error)
                 log.error("the alerts are lost at a restart: %s", error)
+
+    def _load(self) -> Sequence[Alert]:
+        try:
+            data = read_file(self._file, LARGEST, links=False)
+            return msgspec.json.decode(data, type=list[Alert])
+        except FileNotFoundError:
+            return ()
+        except (OSError, ConfigError, msgspec.DecodeError, UnicodeDecodeError) as error:
+            log.warning("%s cannot be read: %s", self._file, error)
+            shift_log.note("log", f"The earlier alerts cannot be read: {error}")
+            return ()
 
     def _note(self, alerts: Iterable[Alert]) -> None:
         bridges = {robot.id: robot.pose_source.bridge for robot in self._robots()}

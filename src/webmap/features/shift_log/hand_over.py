@@ -3,10 +3,11 @@
 import time
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from webmap.core.shift_choice import SINCE, Choice, may_see
-from webmap.core.shift_log import Entry, shift_log
+from webmap.core.shift_files import Entry
+from webmap.core.shift_log import shift_log
 from webmap.features.shift_log.shift_summary import (
     driving_of,
     running,
@@ -38,30 +39,20 @@ class RobotNow(NamedTuple):
     """Why it is out of service; empty if it is not."""
 
 
-class OpenAlert(NamedTuple):
-    """An alert that is active, or that nobody has acknowledged."""
-
-    began: float
-    robot: str
-    text: str
-    over: bool
-    by: str
-
-
 class HandOver:
     """Fills one page with a shift.
 
     Args:
         page: The page.
         robots: Returns the robots of now.
-        alerts: Returns the open alerts.
+        alerts: Returns the alerts of the bell.
     """
 
     def __init__(
         self,
         page: "BasePage",
         robots: Callable[[], Sequence[RobotNow]],
-        alerts: Callable[[], Sequence[OpenAlert]],
+        alerts: Callable[[], Iterable[Any]],
     ) -> None:
         self._role = page.viewer.role
         self._who = page.viewer.operator.logged
@@ -100,7 +91,7 @@ class HandOver:
         self._table(
             "Open alerts",
             ("Since", "Robot", "Alert", "Acknowledged by"),
-            [_alert_row(alert) for alert in self._alerts()],
+            _alert_rows(self._alerts()),
         )
         self._table(
             "Stops",
@@ -151,9 +142,18 @@ class HandOver:
         self._sheet.append(part)
 
 
-def _alert_row(alert: OpenAlert) -> tuple[str, ...]:
-    text = f"{alert.text} (over)" if alert.over else alert.text
-    return _time(alert.began), alert.robot, text, alert.by
+def _alert_rows(alerts: Iterable[Any]) -> list[tuple[str, ...]]:
+    """Return the alerts that are active, or that nobody has acknowledged."""
+    return [
+        (
+            _time(alert.began),
+            alert.name,
+            alert.text if alert.ended is None else f"{alert.text} (over)",
+            "" if alert.by is None else str(alert.by),
+        )
+        for alert in alerts
+        if alert.ended is None or alert.by is None
+    ]
 
 
 def _stop_rows(entries: Iterable[Entry]) -> list[tuple[str, ...]]:

@@ -5,8 +5,9 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from webmap.base.roles import Role
-from webmap.core.shift_choice import KINDS, SAME_SHIFT, Choice, may_see
-from webmap.core.shift_log import Entry, RobotName, shift_log
+from webmap.core.shift_choice import KINDS, Choice, may_see
+from webmap.core.shift_files import Entry
+from webmap.core.shift_log import RobotName, shift_log
 
 if TYPE_CHECKING:
     from webmap.core.map import Map
@@ -73,7 +74,8 @@ class ShiftPanel:
         if "note" in message:
             self._note(message["note"], message.get("about"))
         if message.get("shift") is True:
-            self._hand_over()
+            by = self._viewer.operator
+            shift_log.note("shift", "handed over the shift", person=by)
 
     def poll(self) -> None:
         """Send the page the new entries."""
@@ -127,18 +129,6 @@ class ShiftPanel:
         else:
             problem = "Too many notes in a short time: try again in a minute."
         self.browser_part.send({"problem": problem})
-
-    def _hand_over(self) -> None:
-        now = time.time()
-        recent = (now - e.unix < SAME_SHIFT for e in _shifts())
-        if not any(recent):
-            shift_log.note(
-                "shift", "handed over the shift", person=self._viewer.operator
-            )
-
-
-def _shifts() -> Iterable[Entry]:
-    return (entry for entry in shift_log.entries() if entry.kind == "shift")
 
 
 def _names(entry: Entry) -> tuple[str, ...]:

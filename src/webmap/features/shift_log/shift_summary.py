@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
-from webmap.core.shift_log import Entry
+from webmap.core.shift_files import Entry
 
 Interval = tuple[float, float]
 """From and until, in seconds since 1970."""
