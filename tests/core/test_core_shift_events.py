@@ -176,6 +176,13 @@ def test_stop_its_confirmation_and_its_reset_have_names(bench):
     assert bench.texts(asked, report()) == [("reset", "Ana", "reset STOP")]
 
 
+def test_a_reset_has_no_name_of_a_person_whose_reset_was_refused(bench):
+    bench.texts(report(), report(stop=StopReport("Ana", None, "", "1")))
+    asked = PageAsked("r1", "reset", BEN.name, BEN.identity)
+    refused = PageAsked("r1", "reset", "", None)
+    assert bench.texts(asked, refused, report()) == [("reset", "", "reset STOP")]
+
+
 def test_a_second_press_of_stop_is_another_entry(bench):
     one = StopReport("Ana", None, "", "1")
     two = StopReport("Ben", None, "", "2")
@@ -206,6 +213,11 @@ def test_goals_have_who_sent_them_and_their_end(bench):
         held(goal=goal("sent", "g2")), asked, held(goal=goal("cancelled", "g2"))
     )
     assert found[-1] == ("goal", "Ben", "goal cancelled")
+    # A cancel that ended nothing is not the cause of a later end.
+    found = bench.texts(
+        asked, held(goal=goal("sent", "g3")), held(goal=goal("cancelled", "g3"))
+    )
+    assert found[-1] == ("goal", "", "goal cancelled")
 
 
 def test_a_goal_that_ended_before_the_start_is_not_noted(bench):

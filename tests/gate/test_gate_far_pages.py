@@ -16,7 +16,10 @@ from webmap.gate.protocol import (
     Hello,
     Holder,
     Identity,
+    LeaseEnded,
+    PageAsked,
     Ready,
+    Refused,
     Rename,
     RobotGone,
     RobotReport,
@@ -195,3 +198,23 @@ def test_the_program_knows_its_replies_by_its_name_at_the_agent(bench):
     assert not taken.done()
     bench.receive(TakeReply(1, "r1", 4, None, f"{PREFIX}program"))
     assert taken.result(1) == 4
+
+
+def test_listeners_learn_who_asks_to_end_a_stop_and_why_control_ended(bench):
+    heard = []
+    bench.client.on_report(heard.append)
+    bench.page.receive('{"op":"reset","robot":"r1","stop":"5f0c"}')
+    bench.page.receive('{"op":"cancel","robot":"r1"}')
+    bench.page.receive('{"op":"reset","robot":7}')
+    bench.receive(Refused(bench.id, "r1", "reset", "only an operator may"))
+    bench.receive(Refused(bench.id, "r1", "lease", "the page was closed"))
+    bench.page.close()
+    bench.page.receive('{"op":"cancel","robot":"r1"}')
+    assert heard == [
+        PageAsked("r1", "reset", "Ann", None),
+        PageAsked("r1", "cancel", "Ann", None),
+        PageAsked("r1", "reset", "", None),
+        LeaseEnded("r1", "the page was closed"),
+        PageAsked("r1", "cancel", "", None),
+    ]
+    assert len(bench.link.sent) == 6  # each command went to the gate all the same

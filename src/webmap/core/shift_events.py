@@ -176,6 +176,7 @@ class RobotWatch:
             text = f"lost control: {why}" if why else "released control"
             yield Draft("control", text, robot, _person(before))
         if new.holder is not None and not _is_same(before, new.holder):
+            self.lease_why = ""
             facts = {"epoch": new.epoch, "v": new.v, "w": new.w}
             yield Draft("control", "took control", robot, _person(new.holder), facts)
         asker, asked = new.asker, None if old is None else old.asker
@@ -213,10 +214,8 @@ class RobotWatch:
         self, new: RobotReport, robot: RobotName, now: float
     ) -> Iterator[Draft]:
         limits = round(new.v, 2), round(new.w, 2)
-        if new.holder is None or limits == self.limits:
-            return
-        began, self.limits_at = self.limits_at, max(self.limits_at, now - LIMITS_EVERY)
-        if now - began < LIMITS_EVERY:
+        recent = now - self.limits_at < LIMITS_EVERY
+        if new.holder is None or limits == self.limits or recent:
             return
         self.limits, self.limits_at = limits, now
         why = f": {', '.join(new.why)}" if new.why else ""
@@ -236,6 +235,7 @@ class RobotWatch:
                 return
             holders = (new.holder, None if old is None else old.holder)
             by = next((h for h in holders if h and h.connection == goal.by), None)
+            self.cancelled_by = None
             facts |= {"x": goal.x, "y": goal.y, "yaw": goal.yaw}
             text = f"goal at {goal.x:.2f}, {goal.y:.2f}"
             yield Draft("goal", text, robot, _person(by) if by else None, facts)
@@ -298,7 +298,7 @@ class ShiftWatch:
             case LeaseEnded(robot, why):
                 self._watch(robot).lease_why = why
             case PageAsked(robot, op, name, identity):
-                by = Person.of(name, identity)
+                by = Person.of(name, identity) if name else None
                 if op == "reset":
                     self._watch(robot).reset_by = by
                 else:

@@ -532,6 +532,7 @@ class PageAsked(msgspec.Struct, frozen=True, tag="asked"):
     robot: str
     op: Literal["reset", "cancel"]
     name: str
+    """Empty if the gate has refused it."""
     identity: Identity | None
 
 

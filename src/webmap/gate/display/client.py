@@ -330,6 +330,8 @@ class GateClient:
                 self._pages.on_refusal(message)
                 if what == "lease" and robot is not None:
                     self._report(protocol.LeaseEnded(robot, why))
+                elif what == "reset" and robot is not None:
+                    self._report(protocol.PageAsked(robot, "reset", "", None))
                 for_page = what == "move" and self._pages.knows(connection)
                 if for_page or connection == self._program.connection:
                     self._report(message)
