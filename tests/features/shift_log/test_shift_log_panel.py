@@ -153,13 +153,14 @@ def test_a_hand_over_is_noted(open_page, log):
 
 
 def test_the_panel_shows_that_the_log_cannot_be_written(open_page, log):
-    ann = open_page()
-    ann.panel.on_message({"show": {}})
+    folded, open_one = open_page(), open_page()
+    open_one.panel.on_message({"show": {}})
     log.trouble, log.lost = "The log could not be written: No space left.", 7
-    ann.panel.poll()
-    assert ann.got[-1]["trouble"] == (
-        "The log could not be written: No space left. Missing entries: 7"
-    )
+    for page in (folded, open_one):
+        page.panel.poll()
+        assert page.got[-1]["trouble"] == (
+            "The log could not be written: No space left. Missing entries: 7"
+        )
 
 
 def texts_of(node):

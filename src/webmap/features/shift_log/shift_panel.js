@@ -89,6 +89,8 @@ class ShiftPanel {
       this._list,
       this._stated,
     );
+    this._badge = html("span", "webmap-badge");
+    this._details.querySelector("summary")?.append(this._badge);
     this._details.open = kept.open;
     this._details.addEventListener("toggle", show);
     this._take = lay(map, this._details, "top-left");
@@ -103,6 +105,8 @@ class ShiftPanel {
   receive(message) {
     if (message.problem !== undefined) return this._noted(message.problem);
     setText(this._trouble, message.trouble);
+    setText(this._badge, message.trouble ? "!" : "");
+    this._badge.title = message.trouble;
     const { rows } = this._options;
     if (message.all) {
       this._total = message.count;

@@ -63,7 +63,7 @@ class ShiftPanel:
 
     def on_ready(self) -> None:
         """Forget what a page that was loaded again showed."""
-        self._choice = None
+        self._choice, self._sent = None, (0, 0, "")
 
     def on_message(self, message: dict[str, Any]) -> None:
         """Show entries, add a note, or begin another shift."""
@@ -80,7 +80,11 @@ class ShiftPanel:
     def poll(self) -> None:
         """Send the page the new entries."""
         total, restored, trouble = _state()
-        if self._choice is None or self._sent == (total, restored, trouble):
+        if self._sent == (total, restored, trouble):
+            return
+        if self._choice is None:
+            if trouble != self._sent[2]:
+                self._send({"new": []})
             return
         new, role = shift_log.since(self._sent[0]), self._viewer.role
         names = {
