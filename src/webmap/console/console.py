@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from webmap.features.alerts.alerts import Alerts, AlertWatch
+from webmap.features.incidents.incidents import Incidents
 
 if TYPE_CHECKING:
     from webmap import Bridge, Page, Robot
@@ -57,11 +58,18 @@ class Console:
         self.alerts = Alerts()
         """The alerts of all robots, shared by all pages."""
         self.alert_watch = AlertWatch(self.alerts, self.shown_robots)
+        self.incidents: Incidents | None = None
+        """The incident recorder; None if nothing is recorded."""
 
     def shown_robots(self) -> "list[Robot]":
         """Return the robots of both lists without those that were removed."""
         every = (*self.given, *self.robots)
         return [robot for robot in every if robot not in self._removed]
+
+    def record_incidents(self) -> None:
+        """Record the last minutes of all robots while the process runs."""
+        self.incidents = Incidents(self.shown_robots, self.alerts)
+        self.incidents.begin()
 
     def add(self, robot: "Robot") -> None:
         """Show a robot on all open and future pages."""

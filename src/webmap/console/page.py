@@ -23,6 +23,7 @@ from webmap.console.robot_looks import make_robot
 from webmap.features.alerts.alerts import AlertPanel
 from webmap.features.cameras.camera_panel import CameraPanel
 from webmap.features.doctor.doctor_panel import DoctorReports
+from webmap.features.incidents.incidents import IncidentButton
 from webmap.features.selection.several_robots import SeveralRobots
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ def open_console(
     title: str = PRODUCT,
     place: str | None = None,
     layers_off: Sequence[str] = (),
+    incidents: bool = False,
 ) -> Console:
     """Make the console the page at ``/``.
 
@@ -62,6 +64,8 @@ def open_console(
             the bridges. Use it for bridges whose port changes at each start.
         layers_off: The layers that are off until the user switches them on; costmaps
             are also off where several robots have one.
+        incidents: Whether the last minutes of all robots are recorded, and kept after a
+            STOP or an alarm.
 
     Returns:
         The console, to add robots later.
@@ -73,6 +77,8 @@ def open_console(
     fleet = [make_robot(config, bridges) for config in robots]
     opened = Console(fleet, layers_off)
     opened.alert_watch.begin()
+    if incidents:
+        opened.record_incidents()
     if place is None:
         place = "\n".join(sorted(bridge.url for bridge in bridges))
     kept_under = f"console-{hashlib.sha256(place.encode()).hexdigest()[:16]}"
@@ -161,6 +167,9 @@ def build(
     polls = [frame.place, listed.poll, card.poll, cameras.poll, health.poll]
     polls += [opened.bring_back, links.poll, refused.poll, doctor.poll, costmaps.poll]
     polls += [alerts.poll, map.add_module(OperatorName).poll]
+    if opened.incidents is not None:
+        button = map.add_module(IncidentButton, card.more, opened.incidents)
+        polls.append(button.poll)
     task = asyncio.get_running_loop().create_task(poll_on(polls))
     page.on_close(task.cancel)
 
