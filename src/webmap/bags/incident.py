@@ -236,7 +236,7 @@ def main() -> int:
     """Make a recording, print a sentence if that fails, and delete the segments."""
     folder, file = map(Path, sys.argv[1:3])
     with contextlib.suppress(AttributeError, OSError):
-        os.nice(15)
+        os.nice(10)
     try:
         make_recording(folder, file)
     except (ConfigError, OSError, msgspec.MsgspecError) as error:

@@ -27,10 +27,11 @@ if TYPE_CHECKING:
 POSES = 0.2
 """Seconds between two poses of a robot that moves."""
 
-RARELY = 1.0
-"""Seconds between two scans, and between two poses of a robot that stands still."""
+RARELY = 0.5
+"""Seconds between two scans, and between two poses of a robot that stands still: more
+than a second would be shown as stale when it is played."""
 
-MOST_RAYS = 360
+MOST_RAYS = 240
 """The greatest number of rays of a recorded scan."""
 
 

@@ -104,6 +104,8 @@ class IncidentWriter:
         """The newest recording."""
         self.is_busy = False
         """Whether a recording is made now."""
+        self.left: subprocess.Popen[bytes] | None = None
+        """A process that makes a recording when this one has ended."""
         self._is_ending = False
         self._waiting: Queue[list[Frame] | tuple[str, ...] | None] = Queue(WAITING)
         self._ring: Ring | None = None
@@ -216,7 +218,9 @@ class IncidentWriter:
         command = python_command("webmap.bags.incident", frozen, file)
         if self._is_ending:
             none = subprocess.DEVNULL
-            subprocess.Popen(command, stdin=none, stdout=none, start_new_session=True)
+            self.left = subprocess.Popen(
+                command, stdin=none, stdout=none, start_new_session=True
+            )
             log.info("the last minutes will be kept in %s", file)
             return
         made = subprocess.run(
