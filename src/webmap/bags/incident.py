@@ -1,6 +1,6 @@
 """Makes a recording of a ring: ``python -m webmap.bags.incident FOLDER FILE``.
 
-It runs in a process of its own, with the lowest priority, so that a long recording
+It runs in a process of its own, with a low priority, so that a long recording
 delays neither the page nor a command.
 """
 
@@ -236,7 +236,7 @@ def main() -> int:
     """Make a recording, print a sentence if that fails, and delete the segments."""
     folder, file = map(Path, sys.argv[1:3])
     with contextlib.suppress(AttributeError, OSError):
-        os.nice(10)
+        os.nice(5)
     try:
         make_recording(folder, file)
     except (ConfigError, OSError, msgspec.MsgspecError) as error:
