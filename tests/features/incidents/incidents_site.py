@@ -9,7 +9,7 @@ import webmap
 from webmap.console import open_console
 from webmap.features.incidents import incidents
 
-incidents.AFTER = 1.0
+incidents.AFTER = 2.0
 
 config = webmap.RobotConfig.from_dict(
     {

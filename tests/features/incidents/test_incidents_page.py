@@ -30,7 +30,9 @@ def test_the_button_keeps_the_last_minutes_with_the_stop_in_them(chromium, tmp_p
         page.locator("#card .more > summary").click()
         page.get_by_role("button", name="Keep the last minutes").click()
         kept = page.get_by_role("region", name="Recording").get_by_role("status")
-        expect(kept).to_contain_text(re.compile(r"Kept: \S+\.mcap"), timeout=60_000)
+        expect(kept).to_contain_text(
+            re.compile(r"Kept: \S+-asked\.mcap"), timeout=90_000
+        )
     (file,) = (tmp_path / "recordings").glob("incident-*-asked.mcap")
     found = []
     find_marks([file], found.append)
