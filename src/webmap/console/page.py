@@ -22,7 +22,8 @@ from webmap.console.robot_list import RobotList
 from webmap.console.robot_looks import make_robot
 from webmap.features.alerts.alerts import AlertPanel
 from webmap.features.cameras.camera_panel import CameraPanel
-from webmap.features.doctor.doctor_panel import DoctorReports
+from webmap.features.check.check_panel import CheckPanel
+from webmap.features.doctor.doctor_panel import DoctorReports, entry
 from webmap.features.incidents.incidents import IncidentButton
 from webmap.features.selection.several_robots import SeveralRobots
 
@@ -154,6 +155,7 @@ def build(
     cameras = map.add_module(CameraPanel)
     costmaps = map.add_module(CostmapNames)
     health = map.add_module(RobotHealth, card.notes)
+    check = map.add_module(CheckPanel, card.notes, card.more, entry)
     map.add_module(RobotButtons, card.more)
     doctor = map.add_module(DoctorReports, page.element("bridges"))
     links = BridgeList(
@@ -166,7 +168,7 @@ def build(
     refused = RefusedList(page.element("refused"), page.viewer.role)
     polls = [frame.place, listed.poll, card.poll, cameras.poll, health.poll]
     polls += [opened.bring_back, links.poll, refused.poll, doctor.poll, costmaps.poll]
-    polls += [alerts.poll, map.add_module(OperatorName).poll]
+    polls += [alerts.poll, check.poll, map.add_module(OperatorName).poll]
     if opened.incidents is not None:
         button = map.add_module(IncidentButton, card.more, opened.incidents)
         polls.append(button.poll)
