@@ -223,4 +223,5 @@ class Check:
 
     def _end(self, facts: Facts, why: str = "") -> None:
         self.step, self.why = "over", why
-        self._show(facts)
+        if not self.lines:
+            self._show(facts)
