@@ -48,7 +48,7 @@ def files(folder, kind, number, size=10):
 
 def test_a_recording_is_made_of_what_was_put_before(writer):
     writer.put([STOPPED])
-    writer.keep(("stop of Bob",), asked=False)
+    writer.keep(asked=False)
     until(lambda: writer.kept or writer.trouble)
     assert writer.trouble == ""
     assert writer.kept.path in recordings(recordings_folder(), ITSELF)
@@ -91,7 +91,7 @@ def test_people_are_told_when_no_more_recordings_are_kept_for_them(writer, monke
     assert why_full(folder) == ""
     files(folder, ASKED, 3)
     writer.put([STOPPED])
-    writer.keep(("asked for by Ann",), asked=True)
+    writer.keep(asked=True)
     until(lambda: writer.trouble)
     assert "there are 3 recordings that people asked for" in writer.trouble
     assert not writer.is_busy
@@ -138,7 +138,7 @@ def test_a_recording_that_is_due_at_the_end_is_made_by_a_process(state):
     made.start()
     made.put([STOPPED])
     made._is_ending = True
-    made.keep(("stop of Bob",), asked=False)
+    made.keep(asked=False)
     made.finish()
     assert made.left.wait(60) == 0
     assert recordings(recordings_folder(), ITSELF)

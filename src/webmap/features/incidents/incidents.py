@@ -181,7 +181,7 @@ class Incidents:
         reasons, asked = tuple(keeping.reasons), keeping.asked
         keeping.take(now)
         if self._writer is not None:
-            self._writer.keep(reasons, asked)
+            self._writer.keep(asked)
         # The place where the shift log notes a kept recording.
         log.info("the last minutes are kept: %s", ", ".join(reasons[:MOST_REASONS]))
 

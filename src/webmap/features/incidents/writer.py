@@ -33,6 +33,8 @@ MOST_BYTES = 1 << 30
 LONGEST = 600.0
 """Seconds after which the making of a recording is given up."""
 
+SLOW = "Some of the last minutes are missing: the disk is too slow."
+
 RINGS = 8
 """Most processes with one state folder that record at the same time."""
 
@@ -52,6 +54,11 @@ class Kept:
 def recordings_folder() -> Path:
     """Return the folder of the recordings that are kept."""
     return state_folder() / "recordings"
+
+
+def _file_of(frozen: Path) -> Path:
+    """Return the recording that is made of a frozen ring."""
+    return recordings_folder() / frozen.name.removeprefix("keep-")
 
 
 def recordings(folder: Path, kind: str) -> list[Path]:
@@ -107,7 +114,8 @@ class IncidentWriter:
         self.left: subprocess.Popen[bytes] | None = None
         """A process that makes a recording when this one has ended."""
         self._is_ending = False
-        self._waiting: Queue[list[Frame] | tuple[str, ...] | None] = Queue(WAITING)
+        self._waiting: Queue[list[Frame] | str | None] = Queue(WAITING)
+        self._one_at_a_time = threading.Lock()
         self._ring: Ring | None = None
         self._folder: Path | None = None
         self._lock: int | None = None
@@ -119,14 +127,16 @@ class IncidentWriter:
 
     def put(self, frames: list[Frame]) -> None:
         """Write frames soon; they are dropped if too many wait."""
-        with contextlib.suppress(Full):
+        try:
             self._waiting.put_nowait(frames)
+        except Full:
+            self.trouble = self.trouble or SLOW
 
-    def keep(self, reasons: tuple[str, ...], asked: bool) -> None:
+    def keep(self, asked: bool) -> None:
         """Make a recording of all that was put until now."""
         self.is_busy = True
         try:
-            self._waiting.put_nowait((ASKED if asked else ITSELF, *reasons))
+            self._waiting.put_nowait(ASKED if asked else ITSELF)
         except Full:
             self.is_busy = False
             self._complain("The last minutes were not kept: the disk is too slow")
@@ -152,7 +162,7 @@ class IncidentWriter:
                 if isinstance(what, list):
                     self._write(what)
                 else:
-                    self._make(*what)
+                    self._make(what)
             except Exception as error:  # whatever it is, the next minute counts
                 self._complain(f"The last minutes are not recorded: {one_line(error)}")
         if self._ring is not None:
@@ -173,7 +183,7 @@ class IncidentWriter:
         else:
             raise ConfigError(f"{RINGS} other processes use {rings}")
         for unfinished in folder.glob("keep-*"):  # the computer went down meanwhile
-            self._convert(unfinished, unfinished.name.removeprefix("keep-"))
+            self._convert(unfinished)
 
     def _write(self, frames: list[Frame]) -> None:
         assert self._ring is not None
@@ -183,48 +193,64 @@ class IncidentWriter:
             why = error.strerror or str(error)
             self._complain(f"The last minutes are not recorded: {why}")
         else:
-            if self.trouble.startswith("The last minutes are not recorded"):
+            if self.trouble == SLOW or " not recorded" in self.trouble:
                 self.trouble = ""
 
-    def _make(self, kind: str, *reasons: str) -> None:
+    def _make(self, kind: str) -> None:
+        """Freeze the ring, and have a recording made of it in another thread."""
         assert self._ring is not None
         assert self._folder is not None
-        try:
-            full = why_full(recordings_folder()) if kind == ASKED else ""
-            if full:
-                self._complain(f"The last minutes were not kept: {full}")
-                return
-            name = f"incident-{time.strftime('%Y-%m-%d-%H-%M-%S')}-{kind}.mcap"
-            frozen = self._folder / f"keep-{name}"
-            try:
-                self._ring.freeze(frozen)
-            except OSError as error:
-                shutil.rmtree(frozen, ignore_errors=True)
-                self._complain(f"The last minutes were not kept: {error}")
-                return
-            self._convert(frozen, name)
-        finally:
+        full = why_full(recordings_folder()) if kind == ASKED else ""
+        if full:
             self.is_busy = False
-
-    def _convert(self, frozen: Path, name: str) -> None:
-        """Have a recording made by a process of its own, and wait for it."""
-        folder = recordings_folder()
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        file = folder / name
-        if shutil.disk_usage(folder).free < 2 * SPARE:
-            shutil.rmtree(frozen, ignore_errors=True)
-            self._complain("The last minutes were not kept: the disk is nearly full")
+            self._complain(f"The last minutes were not kept: {full}")
             return
-        command = python_command("webmap.bags.incident", frozen, file)
+        name = f"incident-{time.strftime('%Y-%m-%d-%H-%M-%S')}-{kind}.mcap"
+        frozen = self._folder / f"keep-{name}"
+        try:
+            self._ring.freeze(frozen)
+        except OSError as error:
+            self.is_busy = False
+            shutil.rmtree(frozen, ignore_errors=True)
+            self._complain(f"The last minutes were not kept: {error}")
+            return
+        self._convert(frozen)
+
+    def _convert(self, frozen: Path) -> None:
+        """Have a recording made of the frozen segments in a folder."""
         if self._is_ending:
-            none = subprocess.DEVNULL
+            none, file = subprocess.DEVNULL, _file_of(frozen)
+            command = python_command("webmap.bags.incident", frozen, file)
             self.left = subprocess.Popen(
                 command, stdin=none, stdout=none, start_new_session=True
             )
             log.info("the last minutes will be kept in %s", file)
             return
+        threading.Thread(
+            target=self._wait_for, args=[frozen], name="incident", daemon=True
+        ).start()
+
+    def _wait_for(self, frozen: Path) -> None:
+        """Wait for the process that makes a recording; one runs at a time."""
+        with self._one_at_a_time:
+            self.is_busy = True
+            try:
+                why = self._run_process(frozen, _file_of(frozen))
+            except (OSError, subprocess.SubprocessError) as error:
+                why = one_line(error)
+            if why:
+                shutil.rmtree(frozen, ignore_errors=True)
+                self._complain(f"The last minutes were not kept: {why}")
+            self.is_busy = False
+
+    def _run_process(self, frozen: Path, file: Path) -> str:
+        """Make a recording; return why that failed, or ""."""
+        folder = file.parent
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        if shutil.disk_usage(folder).free < 2 * SPARE:
+            return "the disk is nearly full"
         made = subprocess.run(
-            command,
+            python_command("webmap.bags.incident", frozen, file),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             text=True,
@@ -233,15 +259,16 @@ class IncidentWriter:
             check=False,
         )
         if made.returncode != 0:
-            why = made.stdout.strip().rpartition("\n")[2] or f"status {made.returncode}"
-            self._complain(f"The last minutes were not kept: {why}")
-            return
+            return (
+                made.stdout.strip().rpartition("\n")[2] or f"status {made.returncode}"
+            )
         self.trouble = ""
         size = file.stat().st_size / 1e6
-        self.kept = Kept(file, f"Kept: {name} ({size:.1f} MB), in {folder}.")
+        self.kept = Kept(file, f"Kept: {file.name} ({size:.1f} MB), in {folder}.")
         log.info("the last minutes are kept in %s (%.1f MB)", file, size)
         for each in remove_oldest(folder):
             log.info("%s was deleted: %d newer ones are kept", each, MOST_FILES)
+        return ""
 
     def _complain(self, text: str) -> None:
         text = f"{text.rstrip('.')}."
