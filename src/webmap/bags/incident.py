@@ -20,6 +20,7 @@ from webmap.bags import need_rosbags
 from webmap.bags.playback import EVENTS
 from webmap.bags.recorder import Recorder, new_bag
 from webmap.bags.ring import (
+    BUSY,
     EventRecord,
     Frame,
     Place,
@@ -232,9 +233,30 @@ def _record(folder: Path, recorder: Recorder) -> None:
                 recorder.take(topic, message, time)
 
 
+def is_alone(folder: Path) -> bool:
+    """Return whether no other process makes a recording of this folder.
+
+    The lock ends with this process. A display that is started again while the process
+    of the earlier one goes on must not begin anew.
+    """
+    if sys.platform == "win32":
+        return True
+    import fcntl
+
+    number = os.open(folder, os.O_RDONLY)  # stays open
+    try:
+        fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(number)
+        return False
+    return True
+
+
 def main() -> int:
     """Make a recording, print a sentence if that fails, and delete the segments."""
     folder, file = map(Path, sys.argv[1:3])
+    if not folder.is_dir() or not is_alone(folder):
+        return BUSY
     with contextlib.suppress(AttributeError, OSError):
         os.nice(5)
     try:

@@ -37,6 +37,9 @@ TOTAL = 128 << 20
 SPARE = 64 << 20
 """Bytes that a ring leaves free on its disk, for the files of an active STOP."""
 
+BUSY = 3
+"""Exit status of a process that was to make a recording, if another one does."""
+
 LARGEST = 4 << 20
 """Most bytes of a frame that is read."""
 

@@ -1,5 +1,7 @@
 """The thread that keeps recordings: bounded, and without effect on the rest."""
 
+import fcntl
+import os
 import time
 
 import pytest
@@ -131,6 +133,21 @@ def test_a_recording_that_was_not_finished_is_made_at_the_next_start(state):
     until(lambda: made.kept)
     assert not frozen.exists()
     made.finish()
+
+
+def test_a_recording_that_another_process_makes_is_left_to_that_process(state):
+    frozen = state / "incidents" / "1" / "keep-incident-2026-11-29-auto.mcap"
+    frozen.mkdir(parents=True)
+    number = os.open(frozen, os.O_RDONLY)
+    fcntl.flock(number, fcntl.LOCK_EX)
+    made = IncidentWriter()
+    made.start()
+    until(lambda: made.is_busy)
+    until(lambda: not made.is_busy)
+    made.finish()
+    assert frozen.exists()
+    assert made.trouble == ""
+    os.close(number)
 
 
 def test_a_recording_that_is_due_at_the_end_is_made_by_a_process(state):

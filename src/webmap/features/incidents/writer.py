@@ -13,7 +13,7 @@ from pathlib import Path
 from queue import Full, Queue
 
 from webmap.bags import need_rosbags
-from webmap.bags.ring import SPARE, Frame, Ring
+from webmap.bags.ring import BUSY, SPARE, Frame, Ring
 from webmap.base.errors import ConfigError
 from webmap.base.processes import python_command
 from webmap.base.text import counted, one_line
@@ -258,6 +258,8 @@ class IncidentWriter:
             start_new_session=True,
             check=False,
         )
+        if made.returncode == BUSY:  # the process of an earlier display makes it
+            return ""
         if made.returncode != 0:
             return (
                 made.stdout.strip().rpartition("\n")[2] or f"status {made.returncode}"
