@@ -4,6 +4,8 @@ import json
 import time
 
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 
 from equipment.gate_harness import KEY, URL, Bench, spec
 from webmap.base.errors import ConfigError
@@ -227,6 +229,62 @@ def test_a_demand_that_is_no_time_is_refused(seconds):
 )
 def test_a_span_is_in_the_largest_unit(seconds, text):
     assert span(seconds) == text
+
+
+EVERY = 10.0
+"""Seconds for which a check counts in the schedules below."""
+
+
+@given(
+    st.lists(
+        st.sampled_from(["drive", "drive", "stop", "still", "moves", "silence"])
+        | st.sampled_from(["reset", "check", "answer", "reset and check", "wait"]),
+        max_size=14,
+    )
+)
+@example(["stop", "still", "answer", "reset and check", "drive", "wait", "drive"])
+@settings(max_examples=25, deadline=None)
+def test_no_schedule_drives_fast_without_a_check_that_was_proved_and_is_recent(todo):
+    bench = Bench().begin(
+        spec(odometry_topic="/odom", check_every=EVERY, stop_hooks=(HOOK,))
+    )
+    base = Base(bench)
+    stood, answered, proved, saves = 0.0, False, False, []
+    for each in todo:
+        before = len(bench.did(actions.SaveCheck))
+        match each:
+            case "drive":
+                drive(bench)
+            case "stop":
+                bench.send("a", op="stop", robot="r1")
+                stood, answered = 0.0, False
+            case "still" | "moves":
+                base.velocity = Twist(0.3 if each == "moves" else 0.0)
+                base.run(0.5)
+                stood = stood + 0.5 if each == "still" else 0.0
+            case "silence":
+                bench.run(2.5)
+                stood = 0.0
+            case "answer":
+                for run in bench.did(actions.RunHook)[-1:]:
+                    ended = events.HookEnded("r1", HOOK, run.number, None)
+                    bench.handle(ended)
+                    answered = answered or run.stopped
+            case "wait":
+                bench.run(EVERY)
+                stood = 0.0
+        if each in ("reset", "reset and check") and bench.report().stop is not None:
+            bench.send("a", op="reset", robot="r1")
+            proved = stood > 0.3 and answered
+        if each in ("check", "reset and check"):
+            check(bench)
+        if len(bench.did(actions.SaveCheck)) > before:
+            assert proved, todo
+            proved = False
+            saves.append(bench.now)
+    for write in bench.written:
+        recent = any(0 <= write.at - at <= EVERY + 0.03 for at in saves)
+        assert write.twist.vx <= (1.0 if recent else 0.3) + 1e-9, todo
 
 
 # On disk.
