@@ -2,6 +2,8 @@
 
 import tomllib
 
+import pytest
+
 from webmap.config.checks import Mistakes
 from webmap.config.fleet import FleetConfig, dump, read_fleet
 
@@ -76,3 +78,36 @@ def test_a_line_break_in_a_comment_is_escaped():
     data = {"bridges": {"hall": "ws://hall:9090"}}
     text = dump(data, remarks={("bridges", "hall"): "a\n[robots]"})
     assert text == '[bridges]\nhall = "ws://hall:9090" # a\\n[robots]\n'
+
+
+CHECKED = """
+check_every = "12h"
+[bridges]
+hall = "ws://hall:9090"
+[[robots]]
+name = "Bob"
+twist = "/bob/cmd_vel"
+[[robots]]
+name = "Eve"
+twist = { topic = "/eve/cmd_vel", check_every = "30min" }
+[[robots]]
+name = "Ada"
+odometry = "/ada/odom"
+"""
+
+
+def test_a_check_that_a_fleet_demands_is_demanded_of_each_driven_robot():
+    mistakes = Mistakes()
+    fleet = read_fleet(tomllib.loads(CHECKED), mistakes)
+    assert mistakes.found == []
+    found = [robot.motion.twist for robot in fleet.robots]
+    assert [each and each.check_every for each in found] == [43200.0, 1800.0, None]
+
+
+@pytest.mark.parametrize("time", ["never", "12", "0s", "-1h", "1d", "999999h"])
+def test_a_check_that_is_demanded_within_no_time_is_a_mistake(time):
+    mistakes = Mistakes()
+    read_fleet(tomllib.loads(CHECKED.replace("30min", time)), mistakes)
+    ((path, message),) = mistakes.found
+    assert path == ("robots", 1, "twist", "check_every")
+    assert 'expected a time from 1 s to 366 days, such as "12h"' in message

@@ -129,7 +129,7 @@ class Bench:
                             self.tests.get(key),
                         )
                     )
-                case actions.SaveStop() | actions.SaveStopTest():
+                case actions.SaveStop() | actions.SaveStopTest() | actions.SaveCheck():
                     # The disk works in a thread: it never answers within an action.
                     if not self.slow_disk:
                         self.to_keep.append(action)
@@ -167,6 +167,10 @@ class Bench:
             record = events.StopRecord(latch.seconds, "2026-11-21", latch.error)
             self.tests[latch.key] = record
             self.handle(events.StopTestSaved(latch.key, record))
+            return
+        if isinstance(latch, actions.SaveCheck):
+            record = events.CheckRecord(latch.by, 1_790_000_000.0, 0.0)
+            self.handle(events.CheckSaved(latch.key, record))
             return
         error = "the disk is full" if self.full_disk else None
         if not self.full_disk and latch.press is not None:

@@ -36,7 +36,12 @@ classes = ["loud"]
 odometry = { topic = "/mo/odom", bridge = "hall" }
 tf = { namespace = "/mo", bridge = "hall" }
 initial_pose = { topic = "/mo/here", bridge = "hall" }
-twist = { topic = "/mo/cmd_vel", type = "geometry_msgs/TwistStamped", bridge = "hall" }
+
+[robots.twist]
+topic = "/mo/cmd_vel"
+type = "geometry_msgs/TwistStamped"
+bridge = "hall"
+check_every = "12h"
 
 [robots.move]
 action = "/mo/m"

@@ -76,6 +76,8 @@ class Decisions:
 
     def _note(self, event: Any, now: float, actions: Any) -> None:
         line = f"{now:.6f} {event!r} {text_of(actions)}"
+        # What most robots do not have is not part of the record.
+        line = re.sub(r", check(ed|_every)?=None", "", line)
         if "WebMap-" in line:
             line = re.sub(r"WebMap-\w+-\d+", lambda match: self._number(match[0]), line)
         self.count += 1

@@ -1,13 +1,14 @@
 """The marks on the time line of a recording: stops, goals, results and alarms."""
 
 import contextlib
+import json
 import re
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
-from webmap.bags.playback import Mark, Marks
+from webmap.bags.playback import EVENTS, TYPE, Mark, Marks
 from webmap.bags.recording import LOGS, Recording
 from webmap.bags.times import SECOND
 from webmap.base.errors import ConfigError
@@ -47,6 +48,9 @@ STATES = {
 }
 """The names of the states of a goal, by the type of its status."""
 
+KINDS = ("stop", "goal", "result", "alarm")
+"""The kinds of marks."""
+
 STATES_1 = STATES["actionlib_msgs/GoalStatusArray"]
 
 
@@ -65,6 +69,7 @@ class MarkFinder:
         return (
             type_name in (DIAGNOSTICS, *LOGS, *STATES)
             or type_name.endswith(("ActionGoal", "ActionResult"))
+            or (topic, type_name) == (EVENTS, TYPE)
             or (type_name == "std_msgs/Bool" and STOP.search(topic) is not None)
             or (
                 type_name == "geometry_msgs/PoseStamped"
@@ -111,6 +116,10 @@ class MarkFinder:
             status = message["status"]
             state = STATES_1.get(_number(status["status"]), "")
             self._goal(topic, at, _identity(status), state)
+        elif type_name == TYPE:
+            event = json.loads(message["data"])
+            if event["kind"] in KINDS:
+                self._add(at, event["kind"], str(event["text"]))
         elif type_name == "std_msgs/Bool":
             if self._changed((topic,), bool(message["data"])):
                 self._add(at, "stop", f"Stop on {topic}")

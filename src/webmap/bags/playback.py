@@ -182,8 +182,12 @@ STATUS = "/webmap/recording"
 MARKS = "/webmap/recording/marks"
 """Topic with the newest :class:`Marks`, whenever they changed."""
 
+EVENTS = "/webmap/events"
+"""Topic of the events in a recording of the last minutes: JSON with ``kind``, which is
+that of a mark or ``"note"``, and ``text``."""
+
 TYPE = "std_msgs/String"
-"""The type of both topics."""
+"""The type of these topics."""
 
 
 class PlaybackStatus(msgspec.Struct, frozen=True):

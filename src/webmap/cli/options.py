@@ -111,6 +111,15 @@ def web_options(command: F) -> F:
 _WEB = ("host", "port", "tls", "tls_cert", "tls_key", "insecure_lan")
 
 
+incidents_option = click.option(
+    "--no-incidents",
+    is_flag=True,
+    help="Do not record the last ten minutes of the robots, which are otherwise kept "
+    "after a STOP or an alarm.",
+)
+"""Whether incidents are recorded, as an option."""
+
+
 def _set_up_log(ctx: click.Context, param: click.Parameter, value: bool) -> None:
     set_up_logging(logging.DEBUG if value else logging.INFO)
 

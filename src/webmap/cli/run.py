@@ -10,13 +10,14 @@ import click
 from webmap.base.echo import echo
 from webmap.base.plain_files import refuse_special
 from webmap.base.text import counted
-from webmap.cli.options import verbose_option, web_options
+from webmap.cli.options import incidents_option, verbose_option, web_options
 
 
 @click.command(short_help="Serve your own pages, or the robots of a fleet file.")
 @click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@incidents_option
 @web_options
-def run(file: Path, web: dict[str, Any]) -> None:
+def run(file: Path, no_incidents: bool, web: dict[str, Any]) -> None:
     """Serve the pages that FILE.py makes, or the fleet that FILE.toml describes.
 
     A script makes pages with @webmap.page and may call webmap.run() itself; the
@@ -28,7 +29,7 @@ def run(file: Path, web: dict[str, Any]) -> None:
     if file.suffix.lower() == ".toml":
         from webmap.fleet.fleet_file import open_fleet, prepare
 
-        open_fleet(prepare(file))
+        open_fleet(prepare(file), incidents=not no_incidents)
         application.run(**web)
         return
     refuse_special(file)

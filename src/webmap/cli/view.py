@@ -5,7 +5,13 @@ from typing import Any
 import click
 
 from webmap.base.echo import echo
-from webmap.cli.options import Finite, one_bridge, topics_option, web_options
+from webmap.cli.options import (
+    Finite,
+    incidents_option,
+    one_bridge,
+    topics_option,
+    web_options,
+)
 
 
 @click.command()
@@ -68,6 +74,7 @@ from webmap.cli.options import Finite, one_bridge, topics_option, web_options
     "opens without its robots. They are added when the rosbridge answers.",
 )
 @topics_option
+@incidents_option
 @web_options
 def view(
     url: tuple[str, ...],
@@ -80,6 +87,7 @@ def view(
     discover: bool,
     wait: float,
     topics: dict[str, str] | None,
+    no_incidents: bool,
     web: dict[str, Any],
 ) -> None:
     """See and drive the robots behind one rosbridge or several.
@@ -136,7 +144,11 @@ def view(
     shown = [*bridges]
     agents = find_agents([text for text in url if is_agent_url(text)], shown)
     opened = console.open_console(
-        shown, configs, floor=plan, place="\n".join(sorted(url)) if agents else None
+        shown,
+        configs,
+        floor=plan,
+        place="\n".join(sorted(url)) if agents else None,
+        incidents=not no_incidents,
     )
     for each in agents:
         each.show_on(opened)

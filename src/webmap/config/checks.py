@@ -2,6 +2,7 @@
 
 import difflib
 import math
+import re
 import unicodedata
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -287,6 +288,20 @@ def milliseconds(value: Any) -> int:
     if not number or int(value) < 0:
         raise ConfigError("a whole number of milliseconds, 0 or more")
     return int(value)
+
+
+_UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}
+
+
+def duration(value: Any) -> float:
+    """Check a time: seconds, or a text such as ``12h``, ``30min`` or ``90s``."""
+    seconds = value
+    if isinstance(value, str):
+        found = re.fullmatch(r"(\d{1,9}(?:\.\d{1,9})?) ?(s|min|h)", value)
+        seconds = float(found[1]) * _UNITS[found[2]] if found else None
+    if not _number(seconds) or not 1 <= seconds <= 366 * 86400:
+        raise ConfigError('a time from 1 s to 366 days, such as "12h" or "30min"')
+    return float(seconds)
 
 
 def yes_or_no(value: Any) -> bool:

@@ -131,6 +131,8 @@ class FleetConfig(Config, kw_only=True, frozen=True):
     image: Annotated[list[ImageConfig], ONE_OR_MORE] = []
     modules: list[ModuleConfig] = []
     """Modules of the map."""
+    check_every: Annotated[float, checks.duration] | None = None
+    """The same key of each robot with a twist topic, unless it has its own."""
     tiles: TilesConfig | None = None
     labels: Annotated[list[Any] | str, _labels] = ""
     """Tables of labels, or the name of a file with them."""
@@ -160,9 +162,21 @@ def read_fleet(data: Mapping[str, Any], mistakes: Mistakes) -> FleetConfig:
     assert fleet is not None, "a file is a table"
     if fleet.bridges:
         fleet = _linked(fleet, mistakes)
+    if fleet.check_every is not None:
+        robots = [_with_check(each, fleet.check_every) for each in fleet.robots]
+        fleet = msgspec.structs.replace(fleet, robots=robots)
     _no_name_twice(fleet.robots, mistakes)
     _no_base_twice(fleet, mistakes)
     return fleet
+
+
+def _with_check(robot: RobotConfig, every: float) -> RobotConfig:
+    """Return a robot that demands a check, unless it says itself how often."""
+    twist = robot.motion.twist
+    if twist is None or twist.check_every is not None:
+        return robot
+    checked = msgspec.structs.replace(twist, check_every=every)
+    return robot.with_part("twist", checked)
 
 
 def _has_agents(bridges: Any) -> bool:

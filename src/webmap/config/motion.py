@@ -130,6 +130,9 @@ class TwistConfig(TopicConfig, kw_only=True, frozen=True):
         None
     )
     """The greatest acceleration; it never delays slowing down."""
+    check_every: Annotated[float, checks.duration] | None = None
+    """Seconds after a check before driving until the next one is due; without it the
+    robot drives slowly."""
     holonomic: bool = False
     """Whether the base can move sideways."""
     stop_hooks: list[StopHook] = []

@@ -68,7 +68,7 @@ class SpeedTable:
         self._why.clear()
         for reason in reasons:
             badge = html.span(text=reason, class_="badge")
-            if "not verified" in reason:
+            if "not verified" in reason or "not checked" in reason:
                 badge.set("data-tone", "warn")
             self._why.append(badge)
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from webmap.features.alerts.alert_store import AlertKeeper
 from webmap.features.alerts.alerts import Alerts, AlertWatch, conditions
+from webmap.features.incidents.incidents import Incidents
 from webmap.features.shift_log.hand_over import RobotNow
 
 if TYPE_CHECKING:
@@ -63,6 +64,8 @@ class Console:
         """The alerts of all robots, shared by all pages."""
         self.alert_watch = AlertWatch(self.alerts, self.shown_robots)
         self.alert_keeper: AlertKeeper | None = None
+        self.incidents: Incidents | None = None
+        """The incident recorder; None if nothing is recorded."""
 
     def keep_alerts(self, name: str) -> None:
         """Watch the robots for alerts, and keep those of earlier starts.
@@ -78,6 +81,11 @@ class Console:
         """Return the robots of both lists without those that were removed."""
         every = (*self.given, *self.robots)
         return [robot for robot in every if robot not in self._removed]
+
+    def record_incidents(self) -> None:
+        """Record the last minutes of all robots while the process runs."""
+        self.incidents = Incidents(self.shown_robots, self.alerts)
+        self.incidents.begin()
 
     def add(self, robot: "Robot") -> None:
         """Show a robot on all open and future pages."""

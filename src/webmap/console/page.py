@@ -22,7 +22,9 @@ from webmap.console.robot_list import RobotList
 from webmap.console.robot_looks import make_robot
 from webmap.features.alerts.alerts import AlertPanel
 from webmap.features.cameras.camera_panel import CameraPanel
-from webmap.features.doctor.doctor_panel import DoctorReports
+from webmap.features.check.check_panel import CheckPanel
+from webmap.features.doctor.doctor_panel import DoctorReports, entry
+from webmap.features.incidents.incidents import IncidentButton
 from webmap.features.selection.several_robots import SeveralRobots
 from webmap.features.shift_log.hand_over import HTML, HandOver
 from webmap.features.shift_log.shift_panel import ShiftPanel
@@ -54,6 +56,7 @@ def open_console(
     title: str = PRODUCT,
     place: str | None = None,
     layers_off: Sequence[str] = (),
+    incidents: bool = False,
 ) -> Console:
     """Make the console the page at ``/``.
 
@@ -67,6 +70,8 @@ def open_console(
             the bridges. Use it for bridges whose port changes at each start.
         layers_off: The layers that are off until the user switches them on; costmaps
             are also off where several robots have one.
+        incidents: Whether the last minutes of all robots are recorded, and kept after a
+            STOP or an alarm.
 
     Returns:
         The console, to add robots later.
@@ -82,6 +87,8 @@ def open_console(
     kept_under = f"console-{hashlib.sha256(place.encode()).hexdigest()[:16]}"
     opened.set_module("Labels", name=kept_under)
     opened.keep_alerts(kept_under)
+    if incidents:
+        opened.record_incidents()
 
     @webmap.page("/", html="console.html", title=title)
     def console(page: "Page") -> None:
@@ -162,6 +169,7 @@ def build(
     cameras = map.add_module(CameraPanel)
     costmaps = map.add_module(CostmapNames)
     health = map.add_module(RobotHealth, card.notes)
+    check = map.add_module(CheckPanel, card.notes, card.more, entry)
     map.add_module(RobotButtons, card.more)
     doctor = map.add_module(DoctorReports, page.element("bridges"))
     links = BridgeList(
@@ -174,7 +182,10 @@ def build(
     refused = RefusedList(page.element("refused"), page.viewer.role)
     polls = [frame.place, listed.poll, card.poll, cameras.poll, health.poll]
     polls += [opened.bring_back, links.poll, refused.poll, doctor.poll, costmaps.poll]
-    polls += [alerts.poll, shift.poll, map.add_module(OperatorName).poll]
+    polls += [alerts.poll, shift.poll, check.poll, map.add_module(OperatorName).poll]
+    if opened.incidents is not None:
+        button = map.add_module(IncidentButton, card.more, opened.incidents)
+        polls.append(button.poll)
     task = asyncio.get_running_loop().create_task(poll_on(polls))
     page.on_close(task.cancel)
 

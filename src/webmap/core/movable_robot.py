@@ -113,6 +113,7 @@ class MovableRobot(Extendable):
         z_max: float | None = None,
         rx_max: float | None = None,
         ry_max: float | None = None,
+        check_every: float | str | None = None,
     ) -> None:
         """Set the topic for velocity, with the limits and the behaviour of the base.
 
@@ -144,6 +145,9 @@ class MovableRobot(Extendable):
                 second. Without it, the robot takes no ``rx``.
             ry_max: The greatest rate of turn about the left axis in radians per second.
                 Without it, the robot takes no ``ry``.
+            check_every: How long a check before driving counts, in seconds or as in
+                ``"12h"``. Without such a check, the speed limits are 0.3 m/s and
+                0.6 rad/s. If left out, no check is demanded.
 
         Raises:
             ConfigError: If ``type`` carries no velocity, or a number or a stop hook is

@@ -213,9 +213,17 @@ def _map_file(
     return (str(file), *others), options
 
 
-def open_fleet(ready: ReadyFleet) -> None:
-    """Serve the console with these robots at ``/``."""
-    options = {"title": ready.fleet.title} if ready.fleet.title else {}
+def open_fleet(ready: ReadyFleet, *, incidents: bool = False) -> None:
+    """Serve the console with these robots at ``/``.
+
+    Args:
+        ready: The fleet.
+        incidents: Whether the last minutes of the robots are recorded.
+
+    """
+    options: dict[str, Any] = {"incidents": incidents}
+    if ready.fleet.title:
+        options["title"] = ready.fleet.title
     bridges = list(ready.bridges.values())
     if ready.agents:
         urls = sorted(each.url for each in ready.fleet.bridges.values())

@@ -151,6 +151,14 @@ class SaveStopTest:
 
 
 @dataclass(frozen=True, slots=True)
+class SaveCheck:
+    """Save that a person checked the machine; answered by ``CheckSaved``."""
+
+    key: Key
+    by: str
+
+
+@dataclass(frozen=True, slots=True)
 class RunHook:
     """Publish ``stopped`` as the Bool of a stop hook, or call its service.
 
@@ -187,6 +195,7 @@ Action = (
     | MarkDriven
     | SaveStop
     | SaveStopTest
+    | SaveCheck
     | RunHook
     | SendToDisplay
 )

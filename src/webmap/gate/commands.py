@@ -19,6 +19,7 @@ these fields::
     {"op": "grant", "robot": "r1"}
     {"op": "deny", "robot": "r1"}
     {"op": "stop-test", "robot": "r1"}
+    {"op": "check", "robot": "r1"}
 
 ``drive`` is a state, not an event: a page that holds a lease sends it at 20 Hz, also
 when no input is pressed, and stops sending it when anything is uncertain. ``x`` is
@@ -33,6 +34,8 @@ nothing and gives no lease. ``ask`` requests control from the holder, who answer
 ``grant`` or ``deny``; no answer for 10 s grants it. ``release`` also withdraws the
 request. ``stop-test`` creeps, stops sending and measures whether the base stops by
 itself; it needs the lease, released inputs, and a page that goes on sending ``drive``.
+``check`` ends a check before driving; it counts only shortly after the reset of a STOP
+that was confirmed.
 
 A page whose operator drives by a camera adds ``"video"`` to each ``drive``: the age of
 the newest picture on the page, in milliseconds.
@@ -227,6 +230,12 @@ class StopTest(msgspec.Struct, frozen=True, tag_field="op", tag="stop-test"):
     robot: str
 
 
+class Check(msgspec.Struct, frozen=True, tag_field="op", tag="check"):
+    """The person at the page has finished the check before driving."""
+
+    robot: str
+
+
 PageCommand = (
     Take
     | Release
@@ -241,6 +250,7 @@ PageCommand = (
     | Grant
     | Deny
     | StopTest
+    | Check
 )
 
 ControlCommand = Take | Release | SetVelocity | Goal | MoveFor | Locate
@@ -415,6 +425,7 @@ _READERS: dict[str, Callable[[_Fields], PageCommand]] = {
     "grant": lambda fields: Grant(fields.robot()),
     "deny": lambda fields: Deny(fields.robot()),
     "stop-test": lambda fields: StopTest(fields.robot()),
+    "check": lambda fields: Check(fields.robot()),
     "stop": lambda fields: Stop(_one_or_all(fields)),
     "reset": lambda fields: Reset(fields.robot(), fields.identity("stop")),
 }

@@ -19,6 +19,7 @@ import json
 import logging
 import math
 import os
+import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
@@ -28,9 +29,11 @@ from typing import Any
 import msgspec
 
 from webmap.base.plain_files import read_file, write_file
-from webmap.gate.actions import SaveStop, SaveStopTest
+from webmap.gate.actions import SaveCheck, SaveStop, SaveStopTest
 from webmap.gate.commands import MAX_ID
 from webmap.gate.events import (
+    CheckRecord,
+    CheckSaved,
     Event,
     Key,
     LockState,
@@ -193,6 +196,31 @@ class Records:
         except OSError as error:
             log.error("%s: %s", path, error)
 
+    def check_of(self, key: Key) -> CheckRecord | None:
+        """Return the newest check of a machine before driving, if there was one."""
+        paths = _paths_of(self._folder, key, "check")
+        path = next(filter(os.path.lexists, paths), paths[0])
+        try:
+            found = json.loads(read_file(path, LARGEST, links=False))
+            by, at = found["by"], float(found["at"])
+            if not isinstance(by, str) or _odd(at):
+                raise ValueError("invalid values")
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:
+            log.warning("%s cannot be read (%s): no check known", path, error)
+            return None
+        return CheckRecord(by[:MAX_NAME], at, time.time() - at)
+
+    def keep_check(self, key: Key, by: str, at: float) -> None:
+        """Write a check before driving to the disk; an error is logged."""
+        path = path_of(self._folder, key, "check")
+        try:
+            who = {"by": by, "at": at, "bridge": key.url, "topic": key.topic}
+            self._write(path, who)
+        except OSError as error:
+            log.error("%s: %s", path, error)
+
     def _write(self, path: Path, content: dict[str, Any]) -> None:
         """Write a file so that a crash leaves the whole old or the whole new one."""
         write_file(path, json.dumps(content).encode())
@@ -281,6 +309,7 @@ class Disk:
             state,
             latched=self._records.latch_of(state.key),
             tested=self._records.stop_test_of(state.key),
+            checked=self._records.check_of(state.key),
         )
 
     def forget(self, key: Key) -> None:
@@ -308,7 +337,7 @@ class Disk:
         return seen
 
     def keep(
-        self, action: SaveStop | SaveStopTest, emit: Callable[[Event], None]
+        self, action: SaveStop | SaveStopTest | SaveCheck, emit: Callable[[Event], None]
     ) -> None:
         """Write a record; ``emit`` is called with an event when it is on disk."""
         loop = asyncio.get_running_loop()
@@ -338,12 +367,16 @@ class Disk:
         is_own = found and action.press and found.id == action.press.id
         return stamp if is_own else UNSEEN
 
-    def _do(self, action: SaveStop | SaveStopTest) -> Event:
+    def _do(self, action: SaveStop | SaveStopTest | SaveCheck) -> Event:
         if isinstance(action, SaveStop):
             error = self._records.keep_latch(action.key, action.press, action.ids)
             if action.key in self._stamps and not (error and action.press):
                 self._stamps[action.key] = self._stamp_after(action)
             return StopSaved(action.key, action.number, error)
+        if isinstance(action, SaveCheck):
+            at = time.time()
+            self._records.keep_check(action.key, action.by, at)
+            return CheckSaved(action.key, CheckRecord(action.by, at, 0.0))
         today = datetime.datetime.now().astimezone().date().isoformat()
         record = StopRecord(action.seconds, today, action.error)
         self._records.keep_stop_test(action.key, record)

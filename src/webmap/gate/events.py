@@ -223,6 +223,18 @@ class StopRecord:
 
 
 @dataclass(frozen=True, slots=True)
+class CheckRecord:
+    """The newest check before driving, as it is kept on disk."""
+
+    by: str
+    """The name of the person who made it."""
+    at: float
+    """When, in seconds since 1970."""
+    age: float
+    """Seconds since then, when the disk was read; negative if the clock was wrong."""
+
+
+@dataclass(frozen=True, slots=True)
 class LockState:
     """Whether this gate, and so no other gate on this computer, has the machine."""
 
@@ -237,6 +249,8 @@ class LockState:
     """The result of the last stop test, if there is one."""
     elsewhere: bool = False
     """Whether another gate on this computer has the machine."""
+    checked: CheckRecord | None = None
+    """The newest check before driving, if there is one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,6 +281,14 @@ class StopTestSaved:
 
 
 @dataclass(frozen=True, slots=True)
+class CheckSaved:
+    """A ``SaveCheck``, with its time."""
+
+    key: Key
+    record: CheckRecord
+
+
+@dataclass(frozen=True, slots=True)
 class Shutdown:
     """The process must end: stop the driven machines, then send nothing more."""
 
@@ -291,5 +313,6 @@ Event = (
     | StopSaved
     | StopFileChanged
     | StopTestSaved
+    | CheckSaved
     | Shutdown
 )

@@ -74,7 +74,7 @@ class Locks:
         """Lock a machine; the answer has the reason if another gate has it."""
         try:
             self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            file = _open_locked(self._path(key))
+            file = open_locked(self._path(key))
         except ConfigError as error:
             return LockState(key, held=False, why=str(error))
         except OSError as error:
@@ -135,7 +135,7 @@ class Locks:
         return path_of(self._folder, key, "lock")
 
 
-def _open_locked(path: Path) -> int | None:
+def open_locked(path: Path) -> int | None:
     """Open or create a file and lock it; None if another process has the lock.
 
     Another process may lock it for a moment and remove it, see :meth:`Locks.tidy`.

@@ -162,7 +162,7 @@ class Shell:
                 self._disk.forget(key)
             case actions.MarkDriven(key, driven):
                 self._locks.mark(key, driven)
-            case actions.SaveStop() | actions.SaveStopTest():
+            case actions.SaveStop() | actions.SaveStopTest() | actions.SaveCheck():
                 self._disk.keep(action, self.deliver)
             case actions.Watch(key, on):
                 (self._watched.add if on else self._watched.discard)(key)

@@ -101,6 +101,9 @@ class RobotSpec(
     """The highest rate of turn about the left axis, in rad/s; likewise."""
     a_max: float | None = None
     """Greatest growth of the speed, in m/s²; slowing down is never limited."""
+    check_every: float | None = None
+    """Seconds after a check before driving until the next one is due, if one is
+    demanded. Without it the robot drives slowly."""
     odometry_topic: str | None = None
     odometry_type: str | None = None
     odometry_url: str | None = None
@@ -272,6 +275,17 @@ class TestReport(msgspec.Struct, frozen=True):
     text: str
 
 
+class CheckReport(msgspec.Struct, frozen=True):
+    """The newest check before driving."""
+
+    every: float | None
+    """Seconds after which the next one is due; ``None`` if none is demanded."""
+    by: str = ""
+    """The name of the person who made it; empty if there was none."""
+    at: float | None = None
+    """When, in seconds since 1970, by the clock of the gate's computer."""
+
+
 class GoalReport(msgspec.Struct, frozen=True, kw_only=True):
     """The state of the newest goal; unreported values are ``None``."""
 
@@ -391,6 +405,8 @@ class RobotReport(msgspec.Struct, frozen=True, kw_only=True, tag="robot"):
     nodes, as text."""
     hooks: tuple[str, ...] = ()
     """Which stop hooks failed or were not sent yet, and why, as text."""
+    check: CheckReport | None = None
+    """The newest check before driving, if there was one or one is demanded."""
 
 
 MAY_MOVE = (

@@ -254,6 +254,7 @@ def checked(spec: RobotSpec) -> RobotSpec:
         rx_max=_number(spec, "rx_max", least=1e-3),
         ry_max=_number(spec, "ry_max", least=1e-3),
         a_max=_number(spec, "a_max", least=1e-3),
+        check_every=_number(spec, "check_every", least=1.0),
         stops_within=_number(spec, "stops_within", least=0.0),
         assist=spec.assist and checked_assist(spec.name, spec.assist),
         stop_hooks=checked_hooks(spec.name, spec.stop_hooks, spec.twist_topic),

@@ -300,6 +300,15 @@ export class Drive {
     this._pilot.stopTest(robot, performance.now());
   }
 
+  /**
+   * Report a check before driving, which the gate keeps if it saw a proved STOP.
+   *
+   * @param {string} robot
+   */
+  check(robot) {
+    this._send([{ op: "check", robot }]);
+  }
+
   /** End: neutral, control released, connection closed. */
   close() {
     this._goNeutral(true);

@@ -1,6 +1,7 @@
 """Laser scans, drawn as dots."""
 
 import math
+import time
 from dataclasses import KW_ONLY
 from typing import Annotated, Any
 
@@ -97,6 +98,8 @@ class LaserScanner(RobotLayer):
     def build(self) -> None:
         """Make the path of all dots."""
         self.dots = self.add(svg.path(class_="dot"))
+        self.newest_scan: tuple[LaserScanMsg, float] | None = None
+        """The newest scan, and when it was sent, in seconds of ``time.monotonic()``."""
 
     def read(self, message: LaserScanMsg) -> Rays:
         """Return the rays, relative to the sensor at the first one.
@@ -113,6 +116,7 @@ class LaserScanner(RobotLayer):
         if 0.0 < took <= LONGEST_SWEEP:
             moved = self.placed.moved_within(message.frame_id, message.stamp, took)
             rays = replace(rays, moved=(moved.x, moved.y, moved.yaw))
+        self.newest_scan = message, time.monotonic() - self.bridge.lag
         return rays
 
     def draw(self, found: Rays, at: Transform) -> None:

@@ -36,6 +36,8 @@ class StopHooks:
         self._owes_reset = False
         self._failed: dict[tuple[str, str], str] = {}
         """Why the last message did not arrive, by hook."""
+        self._unanswered: set[tuple[str, str]] = set()
+        """The hooks that were sent and whose result is not known yet."""
 
     @property
     def failures(self) -> tuple[str, ...]:
@@ -43,12 +45,18 @@ class StopHooks:
         what = "stop hook" if self._stopped else "reset of stop hook"
         return tuple(f"{what} {name}: {why}" for (_, name), why in self._failed.items())
 
+    @property
+    def done(self) -> bool:
+        """Whether every hook of the last message arrived."""
+        return not self._failed and not self._unanswered
+
     def send(self, stopped: bool) -> None:
         """Send the robot that STOP is active, or that it was reset."""
         if stopped != self._stopped:
             self._failed.clear()
         self._stopped, self._number = stopped, self._number + 1
         self._owes_reset = not stopped and not self.link.up
+        self._unanswered.clear()
         for hook in self.spec.stop_hooks:
             # A service of type Trigger cannot be undone: an emergency stop of the
             # robot itself is reset at the robot.
@@ -57,6 +65,7 @@ class StopHooks:
             if self.link.up:
                 # An earlier failure of this hook stays known until the answer.
                 run = RunHook(self._key, self.spec.id, hook, stopped, self._number)
+                self._unanswered.add(place_of(hook))
                 self._emit(run)
             else:
                 self._failed[place_of(hook)] = NO_LINK
@@ -65,6 +74,7 @@ class StopHooks:
         """Note the result of a hook, if the hooks were not sent again since."""
         if event.number != self._number:
             return
+        self._unanswered.discard(place_of(event.hook))
         if event.why is None:
             self._failed.pop(place_of(event.hook), None)
         else:
@@ -92,6 +102,7 @@ _terms = attrgetter(
     "rx_max",
     "ry_max",
     "a_max",
+    "check_every",
     "odometry_url",
     "odometry_topic",
     "assist",
@@ -150,6 +161,12 @@ class Aliases:
         return min((s.a_max for s in self.specs.values() if s.a_max), default=None)
 
     @property
+    def check_every(self) -> float | None:
+        """Seconds after a check until the next one is due, if a robot demands it."""
+        every = [s.check_every for s in self.specs.values() if s.check_every]
+        return min(every, default=None)
+
+    @property
     def stops_within(self) -> float | None:
         """The seconds until it stops by itself; ``None`` unless every robot has them.
 
@@ -174,6 +191,11 @@ class Aliases:
         """The failed stop hooks of all robots, and why each failed."""
         failures = [text for hooks in self.hooks.values() for text in hooks.failures]
         return tuple(dict.fromkeys(failures))
+
+    @property
+    def hooks_done(self) -> bool:
+        """Whether all stop hooks of all robots arrived."""
+        return all(hooks.done for hooks in self.hooks.values())
 
     def holds_without(self, robot: str) -> bool:
         """Return whether a remaining robot declares the same for the machine."""

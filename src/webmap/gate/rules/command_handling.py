@@ -8,6 +8,7 @@ from webmap.base.geometry import Twist
 from webmap.gate.actions import Emit, SendToDisplay
 from webmap.gate.commands import (
     Ask,
+    Check,
     Command,
     Deny,
     Drive,
@@ -120,6 +121,10 @@ class CommandHandler:
                 if not machine.authority.is_held_by(connection.id):
                     raise Refusal("take control first")
                 machine.driving.begin_test(now)
+            case Check(robot):
+                check_role(connection.role)
+                machine = self._machines.find(robot)
+                machine.check.passed(connection.name or connection.id, now)
             case _:
                 self.cancel(connection, command.robot, now)
 

@@ -28,6 +28,7 @@ from webmap.gate.protocol import RobotSpec, SentTwist
 from webmap.gate.rules.aliases import Aliases
 from webmap.gate.rules.assist import ScanAssist
 from webmap.gate.rules.authority import Authority, MotionConditions
+from webmap.gate.rules.check import PreDriveCheck
 from webmap.gate.rules.connections import Epochs
 from webmap.gate.rules.driving import Driving
 from webmap.gate.rules.health import DisplayPulse, LinkHealth, Observation
@@ -76,7 +77,8 @@ class Machine:
         """The robots that are declared for this machine."""
         self.known = False
         """Whether the shell has reported the lock, and whether STOP is active."""
-        self.speeds = MachineSpeeds(self.robots, control)
+        self.check = PreDriveCheck(key, self.robots, emit)
+        self.speeds = MachineSpeeds(self.robots, control, self.check)
         self.scan_assist = ScanAssist(self.robots)
         self.motion = Motion(
             key, control, self.speeds.bounds, self.scan_assist.limit, emit
@@ -185,6 +187,7 @@ class Machine:
         """Add a robot or update its declaration; both end the lease."""
         self.authority.end("the configuration of the robot was changed", now)
         self.robots.declare(spec, tasks, hooks, now)
+        self.check.look(now)
 
     def attached(self, now: float) -> None:
         """Send an active STOP to a robot that was just added."""
@@ -261,7 +264,9 @@ class Machine:
         """
         if self.conditions.lock.elsewhere:
             raise Refusal(f"{self.conditions.lock.why}: reset the STOP there")
+        proved = self.active_stop.proved
         self.active_stop.reset(stop)
+        self.check.prove(proved, now)
         self._update_watch(now)
 
     def step(self, now: float) -> None:
@@ -337,6 +342,7 @@ class Machine:
     def locked(self, lock: LockState, now: float) -> None:
         """Note whether this gate alone has the machine."""
         self.conditions.lock, self.known, self.speeds.tested = lock, True, lock.tested
+        self.check.take(lock.checked, now)
         if lock.driven:
             self.motion.owe_zero()
             self.link_up(now)
@@ -361,6 +367,7 @@ class Machine:
         self.driving.link_down(f"no connection to {self.key.url}", now)
 
     def _update_watch(self, now: float) -> None:
+        self.check.look(now)  # also whenever somebody gets control
         self.observation.update(
             self.authority.lease is not None
             or self.latch.on

@@ -107,6 +107,7 @@ class Machines:
             events.StopSaved: self._stop_saved,
             events.StopFileChanged: self._stop_file_changed,
             events.StopTestSaved: self._stop_test_saved,
+            events.CheckSaved: self._check_saved,
         }
 
     def __iter__(self) -> Iterator[Machine]:
@@ -522,6 +523,11 @@ class Machines:
         machine = self._of_key(event.key)
         if machine is not None:
             machine.speeds.tested = event.record
+
+    def _check_saved(self, event: events.CheckSaved, now: float) -> None:
+        machine = self._of_key(event.key)
+        if machine is not None:
+            machine.check.take(event.record, now)
 
     def _of_key(self, key: events.Key) -> Machine | None:
         """Return a machine and mark it as changed; ``None`` if it is gone."""

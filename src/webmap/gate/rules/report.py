@@ -78,6 +78,7 @@ def report(machine: Machine, spec: RobotSpec, now: float) -> RobotReport:
         locates=spec.pose_topic is not None,
         goal=goals.report,
         hooks=machine.robots.hook_failures,
+        check=machine.check.report,
     )
 
 

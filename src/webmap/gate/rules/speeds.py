@@ -19,6 +19,7 @@ from webmap.gate.limits import (
     speed_in_force,
 )
 from webmap.gate.rules.aliases import Aliases
+from webmap.gate.rules.check import PreDriveCheck
 from webmap.gate.rules.health import Ages, LinkHealth
 from webmap.gate.rules.motion import DEADMAN, MotionLimits
 
@@ -112,10 +113,13 @@ class MachineSpeeds:
     Args:
         robots: The robots of the machine.
         control: The link that carries velocities.
+        check: The check before driving.
 
     """
 
-    def __init__(self, robots: Aliases, control: LinkHealth) -> None:
+    def __init__(
+        self, robots: Aliases, control: LinkHealth, check: PreDriveCheck
+    ) -> None:
         self.ages = LoopAge(control.trips)
         """The age of the holder's control loop."""
         self.tested: StopRecord | None = None
@@ -123,6 +127,7 @@ class MachineSpeeds:
         self.page_cap = page_cap()
         """The speed limit that the holder's page asks for."""
         self._robots = robots
+        self._check = check
 
     @property
     def own(self) -> Speed:
@@ -131,7 +136,8 @@ class MachineSpeeds:
 
     def _caps(self) -> list[Cap]:
         specs = self._robots.specs.values()
-        return [cap for spec in specs for cap in caps_of(spec, self.tested)]
+        own = [cap for spec in specs for cap in caps_of(spec, self.tested)]
+        return own + self._check.caps
 
     @property
     def speed(self) -> Speed:

@@ -273,6 +273,11 @@ class ActiveStop:
         self._control = control
         self._motion = motion
 
+    @property
+    def proved(self) -> bool:
+        """Whether odometry shows standstill, and every stop hook arrived."""
+        return self.confirmation.confirmed is True and self._robots.hooks_done
+
     def press(self, press: Press, now: float) -> None:
         """Activate STOP; zero is sent before everything else."""
         if self._robots.drivable:

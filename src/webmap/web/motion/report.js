@@ -47,6 +47,8 @@ import { SEEN } from "../constants.js";
  * @property {boolean} [locates] Whether its pose can be set.
  * @property {GoalReport | null} [goal] The state of its newest goal.
  * @property {string[]} [hooks] The stop hooks that failed, and why.
+ * @property {{every: number | null, by: string, at: number | null} | null} [check] The
+ *     last check before driving.
  */
 
 /**
