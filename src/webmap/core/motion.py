@@ -167,6 +167,11 @@ class RobotMotion:
         self.writers: tuple[str, ...] = ()
         """Other nodes that publish the robot's velocity, as far as they are known."""
         robot_motions.add(self)
+        self.set_tags(())
+
+    def set_tags(self, tags: tuple[str, ...]) -> None:
+        """Set the tags of the robot, by which people may have rights."""
+        named_robots[self.id] = self._name, tags
 
     @property
     def is_far(self) -> bool:
@@ -344,6 +349,7 @@ class RobotMotion:
         self.config, self._odometry = MotionConfig(), None
         self.set("twist", None)
         robot_motions.discard(self)
+        named_robots.pop(self.id, None)
 
     def take(self) -> "Future[int]":
         """Request control for this program."""
@@ -485,3 +491,6 @@ def _assist(config: ScanAssistConfig) -> AssistSpec:
 
 robot_motions: set[RobotMotion] = set()
 """The motion of all robots; declared again when the gate starts."""
+
+named_robots: dict[str, tuple[str, tuple[str, ...]]] = {}
+"""The name and the tags of each robot, by its id; read by all threads."""

@@ -272,7 +272,10 @@ def _connect_to_gate(
     send: Callable[[str], None],
     close: Callable[[str], None],
     identity: "Identity",
+    may_drive: Callable[[str], bool] | None,
 ) -> "GateConnection":
     if runtime.gate is None:
         raise WebMapError("WebMap has not been started: call webmap.start()")
-    return runtime.gate.connect(name, role, send, close, identity=identity)
+    return runtime.gate.connect(
+        name, role, send, close, identity=identity, may_drive=may_drive
+    )

@@ -47,6 +47,7 @@ import { SEEN } from "../constants.js";
  * @property {boolean} [locates] Whether its pose can be set.
  * @property {GoalReport | null} [goal] The state of its newest goal.
  * @property {string[]} [hooks] The stop hooks that failed, and why.
+ * @property {boolean} [looks] Whether the person may not drive it, only look and stop it.
  */
 
 /**
@@ -187,7 +188,7 @@ export function stopOf(key) {
  * @returns {boolean} Whether a press may take the lease without a request to a person.
  */
 export function mayTake(report) {
-  if (isLatched(report)) return false;
+  if (isLatched(report) || report.looks) return false;
   return report.armable && (!heldByAnother(report) || heldByProgram(report));
 }
 
