@@ -8,6 +8,21 @@ export const OWN_FILES = new URL("..", import.meta.url);
 /** The URL below which WebMap serves files and sockets; its own files, of any version. */
 export const BASE = new URL(/\/v-\w+\/$/.test(OWN_FILES.pathname) ? ".." : ".", OWN_FILES);
 
+const { document: page, top = globalThis } = globalThis;
+
+/** Whether this page is in a frame: as the server states it, or the browser. */
+export const FRAMED = hasMark("webmap-frame") || top !== globalThis;
+
+/** Milliseconds between two questions whether the person is still signed in at a proxy. */
+const ASK_EVERY = 60_000;
+
+if (hasMark("webmap-ask")) setInterval(() => void whyRefused(), ASK_EVERY);
+
+/** @param {string} name Of an empty element in the head of the page. */
+function hasMark(name) {
+  return Boolean(page?.querySelector(`meta[name="${name}"]`));
+}
+
 /**
  * Resolve an address from the server to a file of the page.
  *
@@ -34,7 +49,7 @@ export function resolve(address, base) {
 export function socketAddress(path, query) {
   const url = new URL(path, BASE);
   url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
-  url.search = new URLSearchParams(query).toString();
+  url.search = new URLSearchParams(FRAMED ? { ...query, frame: "" } : query).toString();
   return url;
 }
 
@@ -110,13 +125,17 @@ export async function whyRefused() {
 }
 
 /**
- * End this browser's session, on all its pages; robots that they drive stop.
+ * End this browser's session, on all its pages; robots that they drive stop. Then the
+ * page is loaded again, or that where a person signs out at a proxy.
  *
  * @returns {Promise<string>} Why that failed; empty if it did not.
  */
 export async function signOut() {
   try {
     const answer = await post("sign-out");
+    const next = answer.ok ? (await answer.text()).trim() : "";
+    if (next) location.assign(next);
+    else if (answer.ok) location.reload();
     return answer.ok ? "" : `You are still signed in: the server answered ${answer.status}.`;
   } catch {
     return "You are still signed in: the server does not answer.";

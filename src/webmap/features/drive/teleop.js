@@ -1,3 +1,4 @@
+import { FRAMED } from "../../web/access.js";
 import { devicesOf } from "../../web/inputs/devices.js";
 import { stoppingDistance } from "../../web/motion/measurements.js";
 import { heldByAnother, isLatched, mayTake, stopOf } from "../../web/motion/report.js";
@@ -19,6 +20,9 @@ import { Panel, Requests, StickPad } from "./teleop_panel.js";
 
 /** The detail of a robot that could be driven, for a person who may not drive. */
 const LOOKS = "You may look and press STOP. An operator can drive.";
+
+/** The same in a frame of another page. */
+const IN_FRAME = "You may look and press STOP. To drive, open WebMap in a tab of its own.";
 
 /** The same for an operator of other robots. */
 const NOT_YOURS = "You may look and press STOP. The robot's own operators can drive.";
@@ -188,7 +192,7 @@ class Teleop {
     const idle = words.state === "free" || words.state === "ready";
     if (idle && this._devices.codeless) words.detail = NO_POSITIONS;
     const invites = idle || words.detail.startsWith("To drive");
-    if (looks && invites) words.detail = this._looks ? LOOKS : NOT_YOURS;
+    if (looks && invites) words.detail = !this._looks ? NOT_YOURS : FRAMED ? IN_FRAME : LOOKS;
     this._panel.showState(withoutKeys(words, pointers, inputs), report, status.delay);
     const asking = request?.by === status.connection;
     const stick = useful ? this._stick.wanted : null;
