@@ -158,7 +158,7 @@ class RobotCard:
         self._words.show(robot, you.person)
         self.element.set("data-state", state.name)
         reasons = (report.other_writer, report.reason) if report is not None else ()
-        looks = not self.map.page.viewer.may_drive(robot)
+        looks = not self.map.page.viewer.may_drive(robot.id)
         self.element.set("data-looks", "" if looks else None)
         reason = " ".join(
             sentence(each) for each in (*reasons, looks and LOOKS) if each
@@ -250,7 +250,7 @@ class RobotCard:
 
     def _remove_robot(self) -> None:
         robot, viewer = self._robot, self.map.page.viewer
-        if robot is None or not viewer.may_drive(robot):
+        if robot is None or not viewer.may_drive(robot.id):
             return
         if robot.state.name == "gone":
             self._remove(robot)

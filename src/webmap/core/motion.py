@@ -26,6 +26,7 @@ from webmap.config.motion import (
     TwistConfig,
 )
 from webmap.config.reading import Config, read_part
+from webmap.core.robot_names import named_robots
 from webmap.gate.limits import PLANE, Axes
 from webmap.gate.protocol import AssistSpec, RobotReport, RobotSpec
 from webmap.gate.rules.obedience import MOST_NAME, MOST_NODES
@@ -491,6 +492,3 @@ def _assist(config: ScanAssistConfig) -> AssistSpec:
 
 robot_motions: set[RobotMotion] = set()
 """The motion of all robots; declared again when the gate starts."""
-
-named_robots: dict[str, tuple[str, tuple[str, ...]]] = {}
-"""The name and the tags of each robot, by its id; read by all threads."""

@@ -15,15 +15,12 @@ import unicodedata
 from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from webmap.base.roles import ALL_ROBOTS, Role, checked_patterns, covers, includes
 from webmap.base.text import isolated
-from webmap.core.motion import named_robots
+from webmap.core.robot_names import named_robots
 from webmap.gate.protocol import Identity
-
-if TYPE_CHECKING:
-    from webmap.core.movable_robot import MovableRobot
 
 log = logging.getLogger("webmap.operators")
 
@@ -118,18 +115,17 @@ class Viewer:
         if self.robots is not ALL_ROBOTS:
             object.__setattr__(self, "robots", checked_patterns(self.robots))
 
-    def may_drive(self, robot: "MovableRobot | str") -> bool:
+    def may_drive(self, robot: str) -> bool:
         """Return whether this viewer may command a robot, and not only stop it.
 
         Args:
-            robot: The robot, or its ``id``; a robot that is unknown belongs to those
-                who may drive every robot.
+            robot: The ``id`` of a robot; one that is unknown belongs to those who may
+                drive every robot.
 
         """
         if not covers(self.role, "operator"):
             return False
-        id = robot if isinstance(robot, str) else robot.id
-        name, tags = named_robots.get(id, ("", ()))
+        name, tags = named_robots.get(robot, ("", ()))
         return "*" in self.robots or includes(self.robots, name, tags)
 
     @property

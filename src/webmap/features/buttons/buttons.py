@@ -86,7 +86,7 @@ class ButtonView:
         self._result.text = _result_text(button, by, why)
 
     def _why_disabled(self) -> str | None:
-        if not self._viewer.may_drive(self.button.robot):
+        if not self._viewer.may_drive(self.button.robot.id):
             return "only operators of this robot can press this button"
         why, by = self.button.why_disabled, self.button.by
         return why and why.replace(f"by {by}", f"by {self._viewer.calls(by)}")
