@@ -367,13 +367,17 @@ class AccessControl:
     ) -> SignedIn | AccessRefusal:
         # Without named users, a browser that is signed in stays the same viewer.
         if self._settings.people is None and viewer is not None:
-            return SignedIn(viewer, self._token.key(viewer.id), None)
+            return SignedIn(viewer, self._key(viewer.id, request), None)
         signed = self._viewer_of(session)
         if signed is None:
             return AccessRefusal(401, "Sign in first.")
         framed = request.framed and bool(self._settings.embed_from)
         cookie = _set_cookie(request, self._token.issue(session), framed=framed)
-        return SignedIn(signed, self._token.key(session), cookie)
+        return SignedIn(signed, self._key(session, request), cookie)
+
+    def _key(self, session: str, request: RequestHead) -> str:
+        framed = request.framed and not self._settings.embed_driving
+        return self._token.key(session, framed=framed)
 
     def _is_own_origin(self, request: RequestHead) -> bool:
         return request.origin in self._settings.origins or same_origin(
@@ -384,7 +388,13 @@ class AccessControl:
         return self._first(map(self._token.session, request.cookie(_name(request))))
 
     def _key_holder(self, request: RequestHead) -> Viewer | None:
-        return self._first(map(self._token.session_of_key, request.keys))
+        token = self._token
+        viewer = self._first(map(token.session_of_key, request.keys))
+        if viewer is not None:
+            return viewer
+        sessions = (token.session_of_key(key, framed=True) for key in request.keys)
+        framed = self._first(sessions)
+        return None if framed is None else replace(framed, role="viewer")
 
     def _first(self, sessions: Iterable[str | None]) -> Viewer | None:
         found = (self._viewer_of(session) for session in sessions if session)

@@ -63,9 +63,9 @@ export function pagePath() {
 /**
  * The storage belongs to one origin, so a server on another port of the same host,
  * which receives WebMap's cookie, cannot read the key. WebMap may have several prefixes
- * there.
+ * there, and a page in a frame has a key of its own.
  */
-const NAME = `webmap key ${BASE.pathname}`;
+const NAME = `webmap ${FRAMED ? "frame " : ""}key ${BASE.pathname}`;
 
 /** The key of this page; a browser may block its storage. */
 let received = "";
