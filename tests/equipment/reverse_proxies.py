@@ -62,11 +62,11 @@ def wait_for_port(port: int, process: "subprocess.Popen[bytes]") -> None:
 
 
 @contextlib.contextmanager
-def nginx(folder: Path, server: str) -> Iterator[int]:
+def nginx(folder: Path, server: str, port: int = 0) -> Iterator[int]:
     """Run the nginx of this system with a server; yield its port."""
     if NGINX is None:
         pytest.skip("nginx is not installed: apt-get install nginx-light")
-    port = free_port()
+    port = port or free_port()
     file = folder / "nginx.conf"
     file.write_text(CONFIGURATION.format(folder=folder, port=port, server=server))
     process = subprocess.Popen([NGINX, "-p", folder, "-c", file])

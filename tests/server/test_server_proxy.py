@@ -8,7 +8,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from equipment.reverse_proxies import PASS, answering, nginx
+from equipment.reverse_proxies import PASS, answering, free_port, nginx
 from equipment.server_fakes import (
     TOKEN,
     FakeGate,
@@ -297,17 +297,20 @@ def drive(port, prefix, key=None, **headers):
     )
 
 
-@pytest.mark.parametrize("strips", [True, False])
+@pytest.mark.parametrize("way", ["nothing is stated", "public URL", "header"])
 def test_behind_nginx_under_a_prefix_a_page_has_its_files_and_sockets(
-    gate, tmp_path, strips
+    gate, tmp_path, way
 ):
+    port = free_port()
+    public = f"http://127.0.0.1:{port}/robots" if way == "public URL" else ""
+    strips = way == "nothing is stated"
     with contextlib.ExitStack() as stack:
-        proxies = Proxies.of("", ["127.0.0.1"])
+        proxies = Proxies.of(public, ["127.0.0.1"])
         server = stack.enter_context(served(gate, proxies=proxies))
         to = f"http://127.0.0.1:{server.port}" + ("/" if strips else "")
-        states = "" if strips else "proxy_set_header X-Forwarded-Prefix /robots;"
+        states = "proxy_set_header X-Forwarded-Prefix /robots;" * (way == "header")
         location = f"location /robots/ {{ proxy_pass {to}; {PASS} {states} }}"
-        port = stack.enter_context(nginx(tmp_path, location))
+        stack.enter_context(nginx(tmp_path, location, port))
         browser = stack.enter_context(browse(port))
         page = browser.get("/robots/lab/", params={"token": TOKEN})
         assert page.status_code == 200
