@@ -144,6 +144,12 @@ def test_a_report_states_that_the_person_only_looks(client):
     client.show_again(all)
     assert [json.loads(text).get("looks") for text in some] == [True, True]
     assert ["looks" in json.loads(text) for text in every] == [False, False]
+    for each in map(json.loads, some):
+        assert (each["method"], each["cancels"], each["locates"]) == (
+            None,
+            False,
+            False,
+        )
 
 
 def test_refused_commands_are_counted_once_a_second_at_most(client, monkeypatch):

@@ -80,8 +80,8 @@ comes when something changed, velocities at 10 Hz at most. Its fields:
     ``"stop hook /e_stop: no answer within 2 s"``.
 
 ``looks``
-    True if the person of the page may only look at this robot and press STOP; left out
-    otherwise.
+    True if the person of the page may only look at this robot and press STOP, and then
+    it takes no goals from this page either; left out otherwise.
 
 ``refused`` names in ``what`` the refused ``op``, or ``"command"`` for an invalid
 command (``robot`` is then null), or ``"lease"`` when a lease has ended. The same
@@ -160,7 +160,7 @@ def robot_text(
     if agent:
         fields["gate"] = agent
     if looks:
-        fields["looks"] = True
+        fields |= {"looks": True, "method": None, "cancels": False, "locates": False}
     for key in ("holder", "asker", "stop"):
         if fields[key] is not None:
             _localize(fields[key], prefix)
