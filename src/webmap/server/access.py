@@ -131,6 +131,8 @@ class RequestHead:
         """Return the request of an ``http`` or ``websocket`` scope."""
         method = scope.get("method", "")
         is_socket = scope["type"] == "websocket"
+        query = scope.get("query_string", b"").decode("latin-1")
+        fields = tuple(parse_qsl(query, keep_blank_values=True))
         return cls(
             path=scope["path"],
             root=scope.get("root_path", "").rstrip("/"),
@@ -140,19 +142,16 @@ class RequestHead:
             hosts=_headers(scope, b"host"),
             origins=_headers(scope, b"origin"),
             cookies=_headers(scope, b"cookie"),
-            query=tuple(
-                parse_qsl(
-                    scope.get("query_string", b"").decode("latin-1"),
-                    keep_blank_values=True,
-                )
-            ),
+            query=fields,
             keys=(
                 *(name for name in scope.get("subprotocols", ()) if name != PROTOCOL),
                 *_headers(scope, KEY.encode()),
             )[:4],
             address=(scope.get("client") or ("",))[0],
             wants_html=any("text/html" in one for one in _headers(scope, b"accept")),
-            framed=_is_framed(scope),
+            # A browser states where it shows a page; the page states it for sockets.
+            framed=FRAME in dict(fields)
+            or not _FRAMES.isdisjoint(_headers(scope, b"sec-fetch-dest")),
         )
 
     @property
@@ -212,13 +211,6 @@ def redact(scope: Scope) -> None:
             [(name, "..." if name in _SECRET else value) for name, value in kept],
             safe=".",
         ).encode("latin-1")
-
-
-def _is_framed(scope: Scope) -> bool:
-    # A browser states where it shows a page; the page states it for its sockets.
-    query = parse_qsl(scope.get("query_string", b"").decode("latin-1"), True)
-    shown = {*_headers(scope, b"sec-fetch-dest")}
-    return FRAME in dict(query) or not shown.isdisjoint(_FRAMES)
 
 
 def _headers(scope: Scope, name: bytes) -> tuple[str, ...]:

@@ -200,7 +200,7 @@ class ProxyUsers:
     """Where a person signs out; empty if the page has no such button."""
     now: Callable[[], float] = time.monotonic
     _seen: OrderedDict[str, tuple[str, float]] = field(default_factory=OrderedDict)
-    """By name, the id of the newest viewer, and when there was a request."""
+    """By person, the id of the newest viewer, and when there was a request."""
 
     def __post_init__(self) -> None:
         """Check the configuration.
@@ -243,14 +243,13 @@ class ProxyUsers:
             return None
         groups = {each.strip() for each in found.value(self.groups_header).split(",")}
         right = next((g for g in self.grants if g.group in {"*", *groups}), None)
+        person = _hash(name)
+        self._seen.pop(person, None)
         if right is None:
-            self._seen.pop(name, None)
             return None
         # Another right is another viewer: the sockets of the earlier one end.
-        known = json.dumps((name, right.role, right.robots))
-        id = hashlib.sha256(known.encode()).hexdigest()[:22]
-        self._seen.pop(name, None)
-        self._seen[name] = id, self.now()
+        id = f"{person}.{_hash(json.dumps((right.role, right.robots)))}"
+        self._seen[person] = id, self.now()
         if len(self._seen) > MOST_SEEN:
             self._seen.popitem(last=False)
         signs_out = bool(self.sign_out_url)
@@ -258,10 +257,12 @@ class ProxyUsers:
 
     def lasts(self, id: str) -> bool:
         """Return whether a viewer was seen lately, with the same rights."""
-        now = self.now()
-        return any(
-            each == id and now - at < LIFE_S for each, at in tuple(self._seen.values())
-        )
+        newest, at = self._seen.get(id.partition(".")[0], ("", 0.0))
+        return newest == id and self.now() - at < LIFE_S
+
+
+def _hash(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 class _Stated:

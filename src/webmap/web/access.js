@@ -65,7 +65,8 @@ export function pagePath() {
  * which receives WebMap's cookie, cannot read the key. WebMap may have several prefixes
  * there, and a page in a frame has a key of its own.
  */
-const NAME = `webmap ${FRAMED ? "frame " : ""}key ${BASE.pathname}`;
+const TAB = `webmap key ${BASE.pathname}`;
+const NAME = FRAMED ? `webmap frame key ${BASE.pathname}` : TAB;
 
 /** The key of this page; a browser may block its storage. */
 let received = "";
@@ -91,7 +92,8 @@ export function takeKey() {
 /** @returns {string} The newest key, which another tab may have received. */
 function key() {
   try {
-    return localStorage.getItem(NAME) ?? received;
+    // A frame on the same site may have the key of a tab; it states that it is a frame.
+    return localStorage.getItem(NAME) ?? (received || localStorage.getItem(TAB)) ?? "";
   } catch {
     return received;
   }
