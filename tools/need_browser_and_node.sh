@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Install Chromium, Node and npm, which the tests need, if they are missing.
+# Install Chromium, Node and npm, which the tests need, if they are missing; nginx too
+# where that is possible, because its tests are skipped without it.
 set -euo pipefail
 here=$(dirname "${BASH_SOURCE[0]}")
 
@@ -14,6 +15,9 @@ elif ! command -v chromium >/dev/null; then
 fi
 command -v node >/dev/null || missing+=(nodejs)
 command -v npm >/dev/null || missing+=(npm)
+if [ "$(id -u)" -eq 0 ] && ! PATH=$PATH:/usr/sbin command -v nginx >/dev/null; then
+  missing+=(nginx-light)
+fi
 # Playwright's driver, which controls Chromium, links to this library.
 if [ "$(uname -s)" = Linux ] && ! /sbin/ldconfig -p | grep -q 'libatomic\.so\.1'; then
   missing+=(libatomic1)

@@ -45,7 +45,7 @@ def spec(robot, url):
 class Page:
     """A page of a display with a robot of its own and one of an agent."""
 
-    def __init__(self):
+    def __init__(self, may_drive=None):
         self.links = []
         gates = Gates()
         gates.own = GateClient(self._link)
@@ -54,7 +54,9 @@ class Page:
         for robot, url in (("here", "ws://127.0.0.1:9090"), (THERE, AGENT)):
             gates.declare(spec(robot, url))
         self.gates = gates
-        self._socket = gates.connect("Ann", "operator", print, print)
+        self._socket = gates.connect(
+            "Ann", "operator", print, print, may_drive=may_drive
+        )
 
     def _link(self, owner, lock):
         self.links.append(Link(owner, lock))
@@ -81,6 +83,20 @@ def test_a_command_reaches_the_gate_of_its_robot_alone(page):
     for op in ("take", "stop", "cancel"):
         for robot, expected in (("here", (True, False)), (THERE, (False, True))):
             assert page.send(json.dumps({"op": op, "robot": robot})) == expected
+
+
+@pytest.mark.parametrize(
+    ("mine", "reached"), [("here", (True, False)), (THERE, (False, True))]
+)
+def test_commands_for_robots_of_others_reach_no_gate(mine, reached):
+    page = Page(lambda robot: robot == mine)
+    for robot in ("here", THERE):
+        expected = reached if robot == mine else (False, False)
+        for op in ("take", "ask", "cancel", "stop-test"):
+            assert page.send(json.dumps({"op": op, "robot": robot})) == expected
+        stopped = (True, False) if robot == "here" else (False, True)
+        assert page.send(json.dumps({"op": "stop", "robot": robot})) == stopped
+    assert page.send('{"op":"stop","robot":"*"}') == (True, True)
 
 
 def test_a_goal_in_the_name_of_a_page_reaches_the_gate_of_its_robot(page):

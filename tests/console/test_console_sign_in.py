@@ -30,11 +30,13 @@ def user(state, *arguments):
 
 @pytest.fixture(scope="module")
 def url(tmp_path_factory):
-    """The address of a demo with an operator and a viewer."""
+    """The address of a demo with an operator, a viewer and an operator of Robot 1."""
     state = tmp_path_factory.mktemp("state")
     user(state, "add", "ana", "--password-stdin")
     user(state, "add", "bob", "--role", "viewer", "--password-stdin")
-    options = ("demo", "-n", "1", "--quiet", "--port", "0", "--no-browser")
+    robots = ("--robots", "Robot 1", "--robots", "bay2/*")
+    user(state, "add", "carla", *robots, "--password-stdin")
+    options = ("demo", "-n", "2", "--quiet", "--port", "0", "--no-browser")
     with webmap(*options, WEBMAP_STATE_DIR=str(state)) as url:
         yield url, state
 
@@ -85,3 +87,52 @@ def test_a_viewer_sees_the_robots_and_drives_none(url, chromium):
         expect(told.first).to_be_visible()
         page.reload()
         expect(page.get_by_label("Password")).to_be_visible()
+
+
+RAW = """
+(message) => new Promise((answer) => {
+  const key = Object.entries(localStorage).find(([name]) => name.includes("key"))[1];
+  const url = new URL("/_webmap/drive?id=raw", location.href);
+  const socket = new WebSocket(url.href.replace("http", "ws"), ["webmap", key]);
+  socket.onmessage = ({ data }) => {
+    const { op, what, why } = JSON.parse(data);
+    if (op === "hello") socket.send(JSON.stringify(message));
+    if (op === "refused") answer([what, why]);
+  };
+})
+"""
+
+
+def test_an_operator_of_one_robot_looks_at_the_others_and_can_stop_them(url, chromium):
+    address, state = url
+    assert "operator  carla of Robot 1, bay2/*" in user(state, "list")
+    with watched_tab(chromium, 1280, 720) as page:
+        page.allowed += [r"\b401\b"]
+        page.goto(address)
+        sign_in(page, "carla")
+        select(page, "Robot 0")
+        driving, card = page.locator(".webmap-teleop"), page.locator("#card")
+        take = driving.get_by_role("button", name="Take control")
+        expect(driving).to_contain_text("The robot's own operators can drive")
+        expect(take).to_be_hidden()
+        expect(card).to_contain_text("Only operators of this robot can drive it")
+        expect(card.get_by_role("button", name="Send goal")).to_be_hidden()
+        robot = card.get_attribute("data-robot")
+        for message in ({"op": "take"}, {"op": "reset", "stop": "x"}):
+            what, why = page.evaluate(RAW, {"robot": robot, **message})
+            assert (what, "Its own operators" in why) == (message["op"], True)
+        page.get_by_role("button", name="STOP Robot 0").click()
+        expect(driving.locator(".webmap-teleop-title")).to_contain_text("STOP")
+        expect(page.get_by_role("button", name="Reset")).to_have_count(0)
+        select(page, "Robot 1")
+        take.click()
+        expect(page.locator(".webmap-teleop-title")).to_have_text("You have control")
+        page.allowed += ["WebSocket connection .* failed"]
+        changed = user(state, "role", "carla", "operator", "--robots", "Robot 0")
+        assert changed == "carla may sign in as operator of Robot 0\n"
+        told = page.get_by_text("You are not signed in any more: load the page again")
+        expect(told.first).to_be_visible()
+        page.reload()
+        sign_in(page, "carla")
+        select(page, "Robot 0")
+        expect(page.get_by_role("button", name="Reset").first).to_be_visible()

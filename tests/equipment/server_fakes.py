@@ -87,6 +87,7 @@ class FakeDrive:
     send: Callable[[str], None]
     end: Callable[[str], None]
     identity: Identity | None = None
+    may_drive: Callable[[str], bool] | None = None
     received: list[str] = field(default_factory=list)
     speeds: tuple[float, float] | None = None
     times_closed: int = 0
@@ -111,8 +112,8 @@ class FakeGate:
     def __call__(self, *args) -> FakeDrive:
         return self.connect(*args)
 
-    def connect(self, name, role, send, close, identity) -> FakeDrive:
-        connection = FakeDrive(name, role, send, close, identity)
+    def connect(self, name, role, send, close, identity, may_drive) -> FakeDrive:
+        connection = FakeDrive(name, role, send, close, identity, may_drive)
         self.connections.append(connection)
         return connection
 

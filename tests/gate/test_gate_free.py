@@ -25,7 +25,7 @@ def free(**changes):
 
 @pytest.fixture
 def pages():
-    return Pages(lambda message: None, threading.RLock(), lambda message: None)
+    return Pages(lambda message: None, threading.RLock(), print, print)
 
 
 def join(pages, *speeds):

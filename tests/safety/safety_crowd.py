@@ -10,7 +10,7 @@ import http.client
 import json
 import re
 import sys
-from urllib.parse import urlsplit
+from urllib.parse import urljoin, urlsplit
 
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed
@@ -23,7 +23,7 @@ def sign_in(url: str) -> str:
     link.request("GET", f"{parts.path}?{parts.query}")
     answer = link.getresponse()
     answer.read()
-    link.request("GET", answer.headers["location"])
+    link.request("GET", urljoin(parts.path, answer.headers["location"]))
     page = link.getresponse().read().decode()
     link.close()
     return re.search(r'name="webmap-key" content="([^"]+)"', page)[1]

@@ -2,6 +2,7 @@ import gzip
 import logging
 import re
 import zlib
+from urllib.parse import urljoin
 
 import pytest
 from starlette.applications import Starlette
@@ -18,7 +19,7 @@ from webmap.server.auth import Token
 from webmap.server.security import CONTENT_SECURITY_POLICY
 
 ORIGIN = {"origin": "http://127.0.0.1:8000"}
-PAGE_JS = 'src="{}/_webmap/v-[0-9a-f]{{16}}/web/page.js"'
+PAGE_JS = 'src="{}_webmap/v-[0-9a-f]{{16}}/web/page.js"'
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
@@ -141,11 +142,12 @@ def test_signing_in_opens_the_page_and_the_token_is_in_no_answer_and_no_log(
     with caplog.at_level(logging.DEBUG):
         answer = stranger.get(f"/lab/?token={TOKEN}")
         location = answer.headers["location"]
-        assert location.startswith("/lab/?webmap_code=")
+        assert location.startswith("./../lab/?webmap_code=")
         assert answer.headers["cache-control"] == "no-store"
+        location = urljoin("/lab/", location)
         page = stranger.get(location)
         assert page.headers["cache-control"] == "no-store"
-        assert stranger.get(location).headers["location"] == "/lab/"
+        assert stranger.get(location).headers["location"] == "./../lab/"
         wrong = stranger.get("/?token=not-the-token", headers={"host": "x"})
     assert page.status_code == 200
     for text in (str(answer.headers), page.text, str(page.headers), wrong.text):
@@ -160,18 +162,18 @@ def test_a_made_page_is_served(client):
     answer = client.get("/lab/")
     assert answer.headers["content-type"] == "text/html; charset=utf-8"
     assert "<title>The &lt;lab&gt;</title>" in answer.text
-    assert re.search(PAGE_JS.format(""), answer.text)
+    assert re.search(PAGE_JS.format("./../"), answer.text)
 
 
 def test_a_missing_or_additional_slash_redirects_to_the_page(client, with_page):
-    assert client.get("/lab").headers["location"] == "/lab/"
-    assert client.get("/own/page/").headers["location"] == "/own/page"
+    assert client.get("/lab").headers["location"] == "./lab/"
+    assert client.get("/own/page/").headers["location"] == "./../../own/page"
 
 
 def test_an_html_page_of_the_user_is_served_with_the_files_of_its_folder(with_page):
     page = with_page.get("/own/page")
     assert "Grüße" in page.text
-    assert re.search(PAGE_JS.format(""), page.text)
+    assert re.search(PAGE_JS.format("./../"), page.text)
     sheet = with_page.get("/own/style.css")
     assert (sheet.status_code, sheet.text) == (200, "a{}")
     assert sheet.headers["content-type"] == "text/css; charset=utf-8"
@@ -233,7 +235,12 @@ def test_a_file_in_the_cache_of_the_browser_is_not_sent_again(client):
 def versioned(client, name):
     """Return the URL of one of WebMap's own files in the page's HTML."""
     page = client.get("/lab/").text
-    return re.search(rf'"(/_webmap/v-[0-9a-f]{{16}}/{re.escape(name)})"', page)[1]
+    return (
+        "/"
+        + re.search(
+            rf'"\./(?:\.\./)*(_webmap/v-[0-9a-f]{{16}}/{re.escape(name)})"', page
+        )[1]
+    )
 
 
 @pytest.mark.parametrize("name", ["web/page.js", "web/webmap.css", "icon.svg"])
@@ -390,7 +397,7 @@ def test_a_sign_in_code_works_once_and_for_one_browser(app, make_client):
     assert "works once" in late.text
     assert "set-cookie" not in late.headers
     # In the browser that used the address, the address still redirects.
-    assert first.get(address).headers["location"] == "/lab/?a=1"
+    assert first.get(address).headers["location"] == "./../lab/?a=1"
 
 
 def test_only_the_page_of_the_sign_in_contains_the_key(client, with_page):
@@ -466,13 +473,13 @@ def test_the_application_works_under_a_prefix(app, rooms, make_client, with_page
     client = make_client(host)
     assert client.get("/robots/").status_code == 401
     answer = client.get(f"/robots/lab/?token={TOKEN}")
-    location = answer.headers["location"]
+    location = urljoin("/robots/lab/", answer.headers["location"])
     assert location.startswith("/robots/lab/?webmap_code=")
     answer = client.get(location)
     assert "Path=/robots/;" in answer.headers["set-cookie"]
     key = key_in(answer.text)
-    assert re.search(PAGE_JS.format("/robots"), client.get("/robots/lab/").text)
-    assert client.get("/robots/lab").headers["location"] == "/robots/lab/"
+    assert re.search(PAGE_JS.format("./../"), client.get("/robots/lab/").text)
+    assert client.get("/robots/lab").headers["location"] == "./lab/"
     assert client.get("/robots/_webmap/icon.svg").status_code == 200
     assert client.get("/robots/own/style.css").text == "a{}"
     url = socket_url("scene", page="lab/", id="p").replace(

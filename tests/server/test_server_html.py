@@ -1,42 +1,63 @@
+from urllib.parse import urljoin
+
 import pytest
 
 from webmap.server.bundles import STARTS
-from webmap.server.html import NEXT, base_of, make_page, prepare_page
+from webmap.server.html import NEXT, base_from, make_page, prepare_page, relative
 
 PRELOADS = "".join(
     f'<link rel="{"modulepreload" if name in STARTS[:2] else NEXT}" '
-    f'href="/_webmap/{name}">'
+    f'href="./_webmap/{name}">'
     for name in STARTS
 )
-SHEET = '<link rel="stylesheet" href="/_webmap/web/webmap.css">' + PRELOADS
+SHEET = '<link rel="stylesheet" href="./_webmap/web/webmap.css">' + PRELOADS
 SCRIPT = "".join(
-    f'<script type="module" src="/_webmap/web/{name}.js"></script>'
+    f'<script type="module" src="./_webmap/web/{name}.js"></script>'
     for name in ("opening", "page")
 )
-ICON = '<link rel="icon" href="/_webmap/icon.svg" type="image/svg+xml">'
+ICON = '<link rel="icon" href="./_webmap/icon.svg" type="image/svg+xml">'
 
 
 def test_a_made_page_has_one_container_and_an_escaped_title():
-    text = make_page("A <b>", base_of(""))
+    text = make_page("A <b>", base_from("/"))
     assert '<div id="webmap_container"></div>' in text
     assert "<title>A &lt;b&gt;</title>" in text
     assert text.count(SCRIPT) == text.count(PRELOADS) == 1
-    assert prepare_page(text, base_of("")).blocked == []
+    assert prepare_page(text, base_from("/")).blocked == []
 
 
 def test_a_made_page_is_resized_by_an_on_screen_keyboard():
-    assert "interactive-widget=resizes-content" in make_page("A", base_of(""))
+    assert "interactive-widget=resizes-content" in make_page("A", base_from("/"))
 
 
-def test_the_base_url_contains_the_prefix():
-    assert base_of("") == "/_webmap/"
-    assert base_of("/robots/") == "/robots/_webmap/"
-    assert base_of('/a "b"') == "/a%20%22b%22/_webmap/"
+@pytest.mark.parametrize(
+    ("path", "base"),
+    [
+        ("/", "./_webmap/"),
+        ("/lab", "./_webmap/"),
+        ("/lab/", "./../_webmap/"),
+        ("/a/b/c", "./../../_webmap/"),
+    ],
+)
+@pytest.mark.parametrize("prefix", ["", "/robots", "/user/x/proxy/8080"])
+def test_the_base_url_is_relative_so_that_it_fits_under_every_prefix(
+    path, base, prefix
+):
+    assert base_from(path) == base
+    page = f"http://host{prefix}{path}"
+    assert urljoin(page, base) == f"http://host{prefix}/_webmap/"
+
+
+@pytest.mark.parametrize("to", ["//evil.example", "https://evil.example", "", "/?a=1"])
+def test_a_relative_url_stays_on_the_server(to):
+    for path in ("/", "/lab", "/_webmap/sign-in"):
+        url = urljoin(f"http://host{path}", relative(path, to))
+        assert url.startswith("http://host/")
 
 
 def test_style_sheets_of_the_user_come_after_webmap_css_and_before_the_script():
     text = '<html><head><link rel="stylesheet" href="a.css"></head><body></body></html>'
-    assert prepare_page(text, base_of("")).text == (
+    assert prepare_page(text, base_from("/")).text == (
         f'<html><head>{SHEET}<link rel="stylesheet" href="a.css">{SCRIPT}{ICON}</head>'
         "<body></body></html>"
     )
@@ -63,7 +84,7 @@ def test_style_sheets_of_the_user_come_after_webmap_css_and_before_the_script():
 def test_html_of_every_form_gets_the_style_sheet_the_script_and_the_icon(
     text, expected
 ):
-    assert prepare_page(text, base_of("")).text == expected
+    assert prepare_page(text, base_from("/")).text == expected
 
 
 def test_files_that_the_html_already_loads_are_not_added_again():
@@ -72,7 +93,7 @@ def test_files_that_the_html_already_loads_are_not_added_again():
         '<link rel="shortcut icon" href="me.png">'
         '<script type="module" src="_webmap/web/page.js"></script></head>'
     )
-    own = prepare_page(text, base_of("")).text
+    own = prepare_page(text, base_from("/")).text
     assert own == text.replace("<head>", f"<head>{PRELOADS}")
 
 
@@ -83,7 +104,7 @@ def test_own_files_of_webmap_that_the_html_loads_get_the_address_of_their_versio
         '<body data-x="_webmap/web/"><img src="_webmap/files/x/y.png">'
         '<script src="/_webmap/features/x.js"></script>'
     )
-    own = prepare_page(text, base_of("/a") + "v-12/").text
+    own = prepare_page(text, base_from("/a/") + "v-12/").text
     assert 'href="../_webmap/v-12/web/style/controls.css">\n' in own
     assert '<link rel="stylesheet" href="web/own.css">' in own
     assert '<body data-x="_webmap/web/">' in own
@@ -98,7 +119,7 @@ def test_content_blocked_by_the_policy_is_named_with_its_line():
         '<script src="https://cdn.example.com/x.js"></script>\n'
         '<img src="//example.com/x.png">\n</head>\n'
         '<body onload="x()">\n<p style="color:red">\n<a href="https://ros.org">',
-        base_of(""),
+        base_from("/"),
     )
     assert [sentence.partition(" is blocked")[0] for sentence in page.blocked] == [
         "line 2: an inline style",

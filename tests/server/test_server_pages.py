@@ -5,6 +5,7 @@ import gc
 import json
 import math
 import time
+from dataclasses import replace
 
 import pytest
 from page_loop import ANN, HELLO, make_model, objects_left, open_page, wait_for
@@ -197,6 +198,21 @@ def test_another_viewer_does_not_get_the_page_of_the_first(loop):
     handle.closed()
     open_page(model, viewer=Viewer("v2", "Eve"))
     wait_for(lambda: len(made) == 2)
+    loop.call(lambda: model.close() or True)
+
+
+@pytest.mark.parametrize("change", [{"role": "viewer"}, {"robots": ("bay2/*",)}])
+def test_a_viewer_with_other_rights_gets_a_new_page(loop, change):
+    pages = []
+    model = make_model(loop, pages.append)
+    before = Viewer("v1", "Ann")
+    handle, _ = open_page(model, viewer=before)
+    wait_for(lambda: pages)
+    handle.closed()
+    open_page(model, viewer=replace(before, **change))
+    wait_for(lambda: len(pages) == 2)
+    assert [page.viewer for page in pages] == [before, replace(before, **change)]
+    assert pages[0].closed
     loop.call(lambda: model.close() or True)
 
 

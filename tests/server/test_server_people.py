@@ -3,6 +3,7 @@
 import json
 import threading
 import time
+from urllib.parse import urljoin
 
 import httpx
 import pytest
@@ -20,6 +21,7 @@ from equipment.server_fakes import (
     wait_for,
 )
 from webmap.base.errors import ConfigError
+from webmap.core import operators
 from webmap.server import people as module
 from webmap.server.access import PROTOCOL, Settings
 from webmap.server.app import WebApp
@@ -91,7 +93,9 @@ def test_a_user_that_is_not_valid_is_refused(users, name, password, words):
     [
         ("[users.ana]\nrole = 'boss'\npassword = 'x'", "boss"),
         ("[users.ana]\nrole = 'viewer'", "password"),
-        ("[users.ana]\npassword = 'x'\nrobots = []", "robots"),
+        ("[users.ana]\npassword = 'x'\nrobots = 'bay2'", "robots"),
+        ("[users.ana]\npassword = 'x'\nrobots = ['tag:']", "pattern of robots"),
+        ("[users.ana]\npassword = 'x'\nmore = []", "more"),
         ('[users."a\\u0000"]\npassword = "x"', "users.toml"),
         ("[users", "users.toml"),
     ],
@@ -147,7 +151,9 @@ def test_the_files_do_not_reveal_a_session(people, tmp_path):
             assert file.stat().st_mode & 0o077 == 0
 
 
-@pytest.mark.parametrize("change", ["remove", "role", "password", "end", "old"])
+@pytest.mark.parametrize(
+    "change", ["remove", "role", "robots", "password", "end", "old"]
+)
 def test_what_ends_a_session(users, people, tmp_path, change):
     session = people.sign_in("ana", PASSWORD, "10.0.0.1")
     other = people.sign_in("Björn Öst", "look only, please", "10.0.0.1")
@@ -156,6 +162,8 @@ def test_what_ends_a_session(users, people, tmp_path, change):
         users.remove("ana")
     elif change == "role":
         users.change("ana", role="viewer")
+    elif change == "robots":
+        users.change("ana", robots=["bay2/*"])
     elif change == "password":
         users.change("ana", password="another password")
     elif change == "end":
@@ -172,6 +180,27 @@ def test_what_ends_a_session(users, people, tmp_path, change):
     assert people.viewer(session) is None
     assert people.viewer(other) is not None
     assert [each.user for _, each in files.all()] == ["Björn Öst"]
+
+
+def test_the_robots_of_a_user_are_kept(users, tmp_path):
+    users.change("ana", robots=["bay2/*", "tag:bay 2"])
+    users.change("ana", role="admin")
+    people = People(tmp_path)
+    viewer = people.viewer(people.sign_in("ana", PASSWORD, "10.0.0.1"))
+    assert viewer.robots == ("bay2/*", "tag:bay 2")
+    users.change("ana", robots=["*"])
+    people.refresh()
+    assert users.read()["ana"].robots == ("*",)
+
+
+def test_a_user_of_an_earlier_version_has_every_robot_and_stays_signed_in(
+    users, people, tmp_path
+):
+    session = people.sign_in("ana", PASSWORD, "10.0.0.1")
+    text = users.path.read_text()
+    users.path.write_text(text.replace('robots = ["*"]\n', ""))
+    people.refresh()
+    assert people.viewer(session).robots == ("*",)
 
 
 def test_a_mistake_in_the_file_leaves_the_users_as_they_were(users, people):
@@ -309,6 +338,20 @@ def test_a_person_signs_in_with_name_and_password(served, browser, gate, caplog)
     assert PASSWORD not in caplog.text
 
 
+def test_the_gate_learns_which_robots_a_person_may_drive(
+    served, browser, gate, users, people, monkeypatch
+):
+    users.change("ana", robots=["bay2/*", "tag:lift"])
+    people.refresh()
+    names = {"r1": ("bay2/bob", ()), "r2": ("bay1/eve", ()), "r3": ("x", ("lift",))}
+    monkeypatch.setattr(operators, "named_robots", names)
+    with drive(served, browser, key_in(type_in(browser).text)):
+        wait_for(lambda: gate.connections)
+    may_drive = gate.connections[0].may_drive
+    assert [may_drive(id) for id in ("r1", "r2", "r3", "r4")] == [True, False] * 2
+    assert gate.connections[0].role == "operator"
+
+
 def test_neither_the_secret_nor_a_wrong_password_signs_in(browser, people, caplog):
     assert browser.get("/", params={"token": people.secret}).status_code == 401
     refused = type_in(browser, password="a wrong password")
@@ -330,9 +373,8 @@ def test_signing_in_leads_to_a_page_of_this_server_alone(browser, path):
     browser.follow_redirects = False
     answer = type_in(browser, path=path)
     assert answer.status_code == 303
-    location = answer.headers["location"]
-    assert location.startswith("/")
-    assert not location.startswith("//")
+    location = urljoin(str(answer.url), answer.headers["location"])
+    assert location.startswith(str(browser.base_url))
 
 
 def test_a_form_that_is_too_long_is_refused(browser):
@@ -346,7 +388,9 @@ def test_the_form_repeats_a_path_as_text(browser):
     assert "<script" not in asked.text
 
 
-@pytest.mark.parametrize("change", ["remove", "role", "password", "end", "sign out"])
+@pytest.mark.parametrize(
+    "change", ["remove", "role", "robots", "password", "end", "sign out"]
+)
 def test_a_session_that_ends_closes_its_sockets_within_a_second(
     served, browser, gate, users, tmp_path, change
 ):
@@ -358,6 +402,8 @@ def test_a_session_that_ends_closes_its_sockets_within_a_second(
             users.remove("ana")
         elif change == "role":
             users.change("ana", role="admin")
+        elif change == "robots":
+            users.change("ana", robots=["bay2/*"])
         elif change == "password":
             users.change("ana", password="another password")
         elif change == "end":

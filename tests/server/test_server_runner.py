@@ -14,6 +14,7 @@ import httpx
 import pytest
 from websockets.sync.client import connect
 
+import webmap
 from equipment.server_fakes import (
     TOKEN,
     FakeGate,
@@ -25,6 +26,7 @@ from equipment.server_fakes import (
 from webmap.base.errors import ConfigError, WebMapError
 from webmap.server.access import Settings
 from webmap.server.app import WebApp
+from webmap.server.proxy import Grant, Proxies, ProxyUsers
 from webmap.server.runner import announce, check_exposure, listen, serve, url_of
 
 PROGRAM = """
@@ -188,3 +190,41 @@ def test_the_url_has_no_token_if_a_host_application_authenticates_viewers():
     assert [type(error) for error in errors] == [BrokenPipeError]
     assert len(urls) == 1
     assert "token" not in urls[0]
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"proxy_user_header": "X-User"}, "everybody could send X-User"),
+        (
+            {"proxy_user_header": "X-User", "trusted_proxies": ["127.0.0.1"]},
+            "nobody could sign in",
+        ),
+        (
+            {"embed_from": ["https://a"], "host": "0.0.0.0", "insecure_lan": True},
+            "in a frame of another page with TLS",
+        ),
+        ({"embed_from": ["a.example"]}, "an origin is a scheme"),
+        ({"public_url": "example.com"}, "the public URL"),
+    ],
+)
+def test_options_of_a_proxy_or_a_frame_that_are_not_safe_are_refused(options, words):
+    with pytest.raises(ConfigError, match=words):
+        webmap.run(port=0, **options)
+
+
+@pytest.mark.parametrize("signs_in", [False, True])
+def test_the_printed_address_is_the_public_one(signs_in):
+    users = ProxyUsers("X-User", (Grant("*", "viewer"),)) if signs_in else None
+    proxies = Proxies.of("https://a.example/robots/")
+    settings = Settings(token=TOKEN, proxies=proxies, proxy_users=users)
+    urls = []
+
+    def ready(url):
+        urls.append(url)
+        raise WebMapError("enough")
+
+    with pytest.raises(WebMapError, match="enough"):
+        serve(app(settings), port=0, on_ready=ready)
+    token = "" if signs_in else f"?token={TOKEN}"
+    assert urls == [f"https://a.example/robots/{token}"]

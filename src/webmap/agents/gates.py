@@ -46,8 +46,10 @@ class PageConnection:
         send: Callable[[str], None],
         close: Callable[[str], None],
         identity: protocol.Identity | None = None,
+        may_drive: Callable[[str], bool] | None = None,
     ) -> None:
         self._gates = gates
+        self._may_drive = may_drive
         self._name = name
         self._identity = identity
         self._role: Role = role
@@ -57,7 +59,12 @@ class PageConnection:
         self._remote: dict[str, DriveConnection] = {}
         self._greeted = False
         self._own = gates.own.connect(
-            name, role, self._from_own, close, identity=identity
+            name,
+            role,
+            self._from_own,
+            close,
+            identity=identity,
+            may_drive=may_drive,
         )
 
     def receive(self, text: str | bytes) -> None:
@@ -107,6 +114,7 @@ class PageConnection:
             self._close,
             self._own.id,
             self._identity,
+            self._may_drive,
         )
         self._remote[url] = connection
         if self._speeds is not None:
@@ -181,9 +189,10 @@ class Gates:
         send: Callable[[str], None],
         close: Callable[[str], None],
         identity: protocol.Identity | None = None,
+        may_drive: Callable[[str], bool] | None = None,
     ) -> PageConnection:
         """Register a page's socket; see :meth:`GateClient.connect`."""
-        page = PageConnection(self, name, role, send, close, identity)
+        page = PageConnection(self, name, role, send, close, identity, may_drive)
         with self._lock:
             self._pages.append(page)
             for url, client in self.remote.items():

@@ -67,6 +67,64 @@ def tls_options(command: F) -> F:
     return command
 
 
+def proxy_options(command: F) -> F:
+    """Add the options of a server behind a proxy, or in a frame of another page."""
+    for option in (
+        click.option(
+            "--embed-driving",
+            is_flag=True,
+            help="Let people drive there, not only look and stop.",
+        ),
+        click.option(
+            "--embed-from",
+            multiple=True,
+            metavar="ORIGIN",
+            help="Let pages of ORIGIN show WebMap in a frame; may be repeated.",
+        ),
+        click.option(
+            "--sign-out-url",
+            default="",
+            metavar="URL",
+            help="Where people sign out at the proxy.",
+        ),
+        click.option(
+            "--proxy-role",
+            "proxy_roles",
+            multiple=True,
+            metavar="GROUP=ROLE[:ROBOTS]",
+            help="What a group of the proxy may do, as 'drivers=operator:bay2/*' or "
+            "'*=viewer'; may be repeated, and a person's first one counts.",
+        ),
+        click.option(
+            "--proxy-groups-header",
+            default="",
+            metavar="NAME",
+            help="The header with the person's groups, with commas in between.",
+        ),
+        click.option(
+            "--proxy-user-header",
+            default="",
+            metavar="NAME",
+            help="The header in which a trusted proxy names who has signed in there.",
+        ),
+        click.option(
+            "--trusted-proxy",
+            "trusted_proxies",
+            multiple=True,
+            metavar="ADDRESS",
+            help="A proxy whose headers count; may be repeated.",
+        ),
+        click.option(
+            "--public-url",
+            default="",
+            metavar="URL",
+            help="The address of WebMap for browsers, behind a proxy.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
 def web_options(command: F) -> F:
     """Add the options of the web interface: its address, TLS and the browser.
 
@@ -84,6 +142,7 @@ def web_options(command: F) -> F:
             is_flag=True,
             help="Allow a --host that other machines reach, without TLS.",
         ),
+        proxy_options,
         tls_options,
         click.option(
             "--host",
@@ -108,7 +167,22 @@ def web_options(command: F) -> F:
     return cast(F, with_web)
 
 
-_WEB = ("host", "port", "tls", "tls_cert", "tls_key", "insecure_lan")
+_WEB = (
+    "host",
+    "port",
+    "tls",
+    "tls_cert",
+    "tls_key",
+    "insecure_lan",
+    "public_url",
+    "trusted_proxies",
+    "proxy_user_header",
+    "proxy_groups_header",
+    "proxy_roles",
+    "sign_out_url",
+    "embed_from",
+    "embed_driving",
+)
 
 
 incidents_option = click.option(

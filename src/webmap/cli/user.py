@@ -28,6 +28,20 @@ _from_input = click.option(
 
 _ROLES = click.Choice(get_args(Role))
 
+_robots = click.option(
+    "--robots",
+    metavar="PATTERN",
+    multiple=True,
+    help="A robot that NAME may drive, by name ('bay2/*') or tag ('tag:bay 2'); "
+    "may be repeated. Everybody sees all robots, and can stop them.",
+)
+
+
+def _rights(user: Any) -> str:
+    """Return what a user may do, in words."""
+    every = user.role == "viewer" or "*" in user.robots
+    return user.role if every else f"{user.role} of {', '.join(user.robots)}"
+
 
 @click.group()
 def user() -> None:
@@ -49,16 +63,19 @@ def user() -> None:
     show_default=True,
     help="What NAME may do.",
 )
+@_robots
 @_from_input
-def add(name: str, role: Any, password_stdin: bool) -> None:
-    """Add a user, and ask for the password."""
+def add(name: str, role: Any, robots: tuple[str, ...], password_stdin: bool) -> None:
+    """Add a user, and ask for the password; without --robots for every robot."""
+    from webmap.base.roles import checked_patterns
     from webmap.server.people import UserFile, checked_user
 
     checked_user(name)
+    checked_patterns(robots)
     file = UserFile(state_folder())
     first = not file.read()
-    file.add(name, role, _password(password_stdin, name))
-    echo(f"{name} may sign in as {role}")
+    file.add(name, role, _password(password_stdin, name), robots)
+    echo(f"{name} may sign in as {_rights(file.read()[name])}")
     if first:
         echo("Start WebMap again: from now on people sign in with name and password")
 
@@ -79,12 +96,18 @@ def passwd(name: str, password_stdin: bool) -> None:
 @user.command()
 @click.argument("name")
 @click.argument("role", type=_ROLES)
-def role(name: str, role: Any) -> None:
-    """Change what a user may do; the user must then sign in again."""
+@_robots
+def role(name: str, role: Any, robots: tuple[str, ...]) -> None:
+    """Change what a user may do, and with which robots.
+
+    Without --robots these stay as they are; --robots '*' is every robot. What the user
+    drives stops, and the user must sign in again.
+    """
     from webmap.server.people import UserFile
 
-    UserFile(state_folder()).change(name, role=role)
-    echo(f"{name} may sign in as {role}")
+    file = UserFile(state_folder())
+    file.change(name, role=role, robots=robots)
+    echo(f"{name} may sign in as {_rights(file.read()[name])}")
 
 
 @user.command()
@@ -104,7 +127,8 @@ def list_users() -> None:
 
     users = UserFile(state_folder()).read()
     for name in sorted(users):
-        echo(f"{users[name].role:<9} {name}")
+        rights = _rights(users[name]).partition(" ")
+        echo(f"{rights[0]:<9} {name}{' ' * bool(rights[2])}{rights[2]}")
     if not users:
         echo("There are no users: everybody with the printed address is an operator")
 

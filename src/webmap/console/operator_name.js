@@ -124,7 +124,6 @@ class OperatorName {
   async _signOut() {
     const failed = await signOut();
     if (failed) setText(this._told, failed);
-    else location.reload();
   }
 
   /** @param {Operator} operator */

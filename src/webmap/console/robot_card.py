@@ -31,6 +31,9 @@ UNABLE = {
 }
 """Why a button of the card is disabled."""
 
+LOOKS = "Only operators of this robot can drive it and send goals"
+"""In place of the buttons, for everybody else."""
+
 TEST_WORDS = (
     ("take", "Stop test: take control"),
     ("ready", "Run stop test"),
@@ -155,7 +158,11 @@ class RobotCard:
         self._words.show(robot, you.person)
         self.element.set("data-state", state.name)
         reasons = (report.other_writer, report.reason) if report is not None else ()
-        reason = " ".join(sentence(each) for each in reasons if each)
+        looks = not self.map.page.viewer.may_drive(robot.id)
+        self.element.set("data-looks", "" if looks else None)
+        reason = " ".join(
+            sentence(each) for each in (*reasons, looks and LOOKS) if each
+        )
         self._reason.text = reason.replace(f"by {you}", "by you")
         self._goal.show(robot)
         self._problems.text = " ".join(map(sentence, robot.problems.values()))
@@ -242,8 +249,10 @@ class RobotCard:
         )
 
     def _remove_robot(self) -> None:
-        robot, may = self._robot, self.map.page.viewer.role != "viewer"
-        if may and robot is not None and robot.state.name == "gone":
+        robot, viewer = self._robot, self.map.page.viewer
+        if robot is None or not viewer.may_drive(robot.id):
+            return
+        if robot.state.name == "gone":
             self._remove(robot)
 
     def _forget_goal(self) -> None:

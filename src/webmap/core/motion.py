@@ -26,6 +26,7 @@ from webmap.config.motion import (
     TwistConfig,
 )
 from webmap.config.reading import Config, read_part
+from webmap.core.robot_names import named_robots
 from webmap.gate.limits import PLANE, Axes
 from webmap.gate.protocol import AssistSpec, RobotReport, RobotSpec
 from webmap.gate.rules.obedience import MOST_NAME, MOST_NODES
@@ -167,6 +168,11 @@ class RobotMotion:
         self.writers: tuple[str, ...] = ()
         """Other nodes that publish the robot's velocity, as far as they are known."""
         robot_motions.add(self)
+        self.set_tags(())
+
+    def set_tags(self, tags: tuple[str, ...]) -> None:
+        """Set the tags of the robot, by which people may have rights."""
+        named_robots[self.id] = self._name, tags
 
     @property
     def is_far(self) -> bool:
@@ -344,6 +350,7 @@ class RobotMotion:
         self.config, self._odometry = MotionConfig(), None
         self.set("twist", None)
         robot_motions.discard(self)
+        named_robots.pop(self.id, None)
 
     def take(self) -> "Future[int]":
         """Request control for this program."""

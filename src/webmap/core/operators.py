@@ -17,8 +17,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from webmap.base.roles import Role
+from webmap.base.roles import ALL_ROBOTS, Role, checked_patterns, covers, includes
 from webmap.base.text import isolated
+from webmap.core.robot_names import named_robots
 from webmap.core.shift_log import shift_log
 from webmap.gate.protocol import Identity
 
@@ -100,6 +101,33 @@ class Viewer:
 
     signs_out: bool = False
     """Whether WebMap has a session of this viewer that the page can end."""
+
+    robots: tuple[str, ...] = ALL_ROBOTS
+    """Which robots the viewer may drive, if the role allows it: patterns of their names
+    (``"bay2/*"``), or of their tags (``"tag:bay 2"``)."""
+
+    def __post_init__(self) -> None:
+        """Check the patterns.
+
+        Raises:
+            ConfigError: If one is not valid.
+
+        """
+        if self.robots is not ALL_ROBOTS:
+            object.__setattr__(self, "robots", checked_patterns(self.robots))
+
+    def may_drive(self, robot: str) -> bool:
+        """Return whether this viewer may command a robot, and not only stop it.
+
+        Args:
+            robot: The ``id`` of a robot; one that is unknown belongs to those who may
+                drive every robot.
+
+        """
+        if not covers(self.role, "operator"):
+            return False
+        name, tags = named_robots.get(robot, ("", ()))
+        return "*" in self.robots or includes(self.robots, name, tags)
 
     @property
     def operator(self) -> Operator:

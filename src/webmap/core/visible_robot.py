@@ -311,7 +311,7 @@ class VisibleRobot(MovableRobot):
     # Lists of robots.
 
     def set_tags(self, tags: Sequence[str]) -> None:
-        """Set the words by which the list of robots is grouped.
+        """Set the words by which the list of robots is grouped, and rights are given.
 
         Args:
             tags: The words, such as ``["bay 3"]``; the first one is the group.
@@ -321,6 +321,7 @@ class VisibleRobot(MovableRobot):
 
         """
         self.tags = tuple(self._checked("tags", tags))
+        self.motion.set_tags(self.tags)
 
     def set_battery_low(self, charge: float) -> None:
         """Set the charge below which the battery is low.

@@ -3,19 +3,20 @@
 import itertools
 import logging
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Affine
-from webmap.base.roles import ROLES, Role, covers, who_may
+from webmap.base.roles import NOT_YOURS, ROLES, Role, covers, who_may
 from webmap.base.scope import Removal, keep
 from webmap.core.base_page import BasePage, page_of
 from webmap.core.extendable import Extendable
 from webmap.core.pictures import pixels_across
 from webmap.core.registry import Namespace
+from webmap.core.robot_names import named_robots
 from webmap.scene import svg
 from webmap.scene.element import Element, Handler
 from webmap.scene.node import Fragment
@@ -403,11 +404,13 @@ class WorldView(Extendable):
         part = self._parts.get(instance)
         if part is None:
             return False
-        least = least_role(part.module, message)
-        if covers(self.page.viewer.role, least):
-            self._call(part.module, "on_message", (message,))
-        else:
+        least, viewer = least_role(part.module, message), self.page.viewer
+        if not covers(viewer.role, least):
             self.show_error(who_may(least))
+        elif least != "viewer" and not all(map(viewer.may_drive, _robots_in(message))):
+            self.show_error(NOT_YOURS)
+        else:
+            self._call(part.module, "on_message", (message,))
         return True
 
     def on_module_ready(self, instance: int) -> None:
@@ -457,3 +460,14 @@ def least_role(module: object, message: Mapping[str, Any]) -> Role:
     names = [op] if isinstance(op, str) else message
     roles = [stated.get(name, "operator") for name in names]
     return max(roles, key=ROLES.index, default="operator")
+
+
+def _robots_in(message: object) -> Iterator[str]:
+    """Return the ids of all robots that a message names, wherever it names them."""
+    if isinstance(message, str):
+        if message in named_robots:
+            yield message
+    elif isinstance(message, Mapping | list):
+        parts = message.values() if isinstance(message, Mapping) else message
+        for part in parts:
+            yield from _robots_in(part)

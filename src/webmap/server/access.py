@@ -11,6 +11,7 @@ from webmap.core.operators import Viewer
 from webmap.server.auth import Attempts, Codes, Token, new_token
 from webmap.server.origins import Hosts, same_origin
 from webmap.server.people import Denied, People
+from webmap.server.proxy import Proxies, ProxyUsers
 
 _SAFE_METHODS = {"GET", "HEAD", "OPTIONS"}
 
@@ -24,6 +25,11 @@ KEY = "webmap-key"
 PROTOCOL = "webmap"
 """The subprotocol of both sockets. A page offers it together with its key, as browsers
 let a page set no other header of a WebSocket."""
+
+FRAME = "frame"
+"""The field of the query of a socket whose page is in a frame."""
+
+_FRAMES = {"iframe", "frame", "embed", "object"}
 
 _SECRET = {TOKEN, CODE}
 
@@ -50,8 +56,32 @@ class Settings:
     authenticate: Authenticate | None = None
     """The host application's authentication, in place of the token."""
 
+    proxy_users: ProxyUsers | None = None
+    """People who sign in at a proxy, in place of the token."""
+
     people: People | None = None
     """The named users, in place of the token; their secret is then the token."""
+
+    proxies: Proxies = field(default_factory=Proxies)
+    """The proxies in front, and the address that browsers see."""
+
+    embed_from: frozenset[str] = frozenset()
+    """Origins whose pages may show WebMap in a frame."""
+
+    embed_driving: bool = False
+    """Whether robots may be driven there."""
+
+    @property
+    def has_token(self) -> bool:
+        """Whether the token signs viewers in."""
+        return not (self.authenticate or self.people or self.proxy_users)
+
+    @property
+    def lasts(self) -> Callable[[str], object] | None:
+        """Return whether a viewer is still signed in; None if that never ends."""
+        if self.people is not None:
+            return self.people.viewer
+        return None if self.proxy_users is None else self.proxy_users.lasts
 
     hosts: Hosts = field(default_factory=Hosts)
     """The accepted names of the server."""
@@ -93,11 +123,16 @@ class RequestHead:
 
     wants_html: bool
 
+    framed: bool
+    """Whether it is for a page in a frame, or of one."""
+
     @classmethod
     def of(cls, scope: Scope) -> "RequestHead":
         """Return the request of an ``http`` or ``websocket`` scope."""
         method = scope.get("method", "")
         is_socket = scope["type"] == "websocket"
+        query = scope.get("query_string", b"").decode("latin-1")
+        fields = tuple(parse_qsl(query, keep_blank_values=True))
         return cls(
             path=scope["path"],
             root=scope.get("root_path", "").rstrip("/"),
@@ -107,18 +142,16 @@ class RequestHead:
             hosts=_headers(scope, b"host"),
             origins=_headers(scope, b"origin"),
             cookies=_headers(scope, b"cookie"),
-            query=tuple(
-                parse_qsl(
-                    scope.get("query_string", b"").decode("latin-1"),
-                    keep_blank_values=True,
-                )
-            ),
+            query=fields,
             keys=(
                 *(name for name in scope.get("subprotocols", ()) if name != PROTOCOL),
                 *_headers(scope, KEY.encode()),
             )[:4],
             address=(scope.get("client") or ("",))[0],
             wants_html=any("text/html" in one for one in _headers(scope, b"accept")),
+            # A browser states where it shows a page; the page states it for sockets.
+            framed=FRAME in dict(fields)
+            or not _FRAMES.isdisjoint(_headers(scope, b"sec-fetch-dest")),
         )
 
     @property
@@ -326,12 +359,17 @@ class AccessControl:
     ) -> SignedIn | AccessRefusal:
         # Without named users, a browser that is signed in stays the same viewer.
         if self._settings.people is None and viewer is not None:
-            return SignedIn(viewer, self._token.key(viewer.id), None)
+            return SignedIn(viewer, self._key(viewer.id, request), None)
         signed = self._viewer_of(session)
         if signed is None:
             return AccessRefusal(401, "Sign in first.")
-        cookie = _set_cookie(request, self._token.issue(session))
-        return SignedIn(signed, self._token.key(session), cookie)
+        framed = request.framed and bool(self._settings.embed_from)
+        cookie = _set_cookie(request, self._token.issue(session), framed=framed)
+        return SignedIn(signed, self._key(session, request), cookie)
+
+    def _key(self, session: str, request: RequestHead) -> str:
+        framed = request.framed and not self._settings.embed_driving
+        return self._token.key(session, framed=framed)
 
     def _is_own_origin(self, request: RequestHead) -> bool:
         return request.origin in self._settings.origins or same_origin(
@@ -342,7 +380,13 @@ class AccessControl:
         return self._first(map(self._token.session, request.cookie(_name(request))))
 
     def _key_holder(self, request: RequestHead) -> Viewer | None:
-        return self._first(map(self._token.session_of_key, request.keys))
+        token = self._token
+        viewer = self._first(map(token.session_of_key, request.keys))
+        if viewer is not None:
+            return viewer
+        sessions = (token.session_of_key(key, framed=True) for key in request.keys)
+        framed = self._first(sessions)
+        return None if framed is None else replace(framed, role="viewer")
 
     def _first(self, sessions: Iterable[str | None]) -> Viewer | None:
         found = (self._viewer_of(session) for session in sessions if session)
@@ -359,7 +403,9 @@ def _name(request: RequestHead) -> str:
     return f"webmap_{request.port}"
 
 
-def _set_cookie(request: RequestHead, value: str) -> str:
-    secure = "; Secure" if request.secure else ""
+def _set_cookie(request: RequestHead, value: str, *, framed: bool) -> str:
     path = quote(request.root) + "/"
-    return f"{_name(request)}={value}; Path={path}; HttpOnly; SameSite=Strict{secure}"
+    site = "SameSite=Strict" + "; Secure" * request.secure
+    if framed:  # browsers keep it apart for each site that shows the frame
+        site = "SameSite=None; Secure; Partitioned"
+    return f"{_name(request)}={value}; Path={path}; HttpOnly; {site}"

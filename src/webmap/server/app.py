@@ -11,7 +11,12 @@ from pathlib import Path
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, RedirectResponse, Response
+from starlette.responses import (
+    HTMLResponse,
+    PlainTextResponse,
+    RedirectResponse,
+    Response,
+)
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import Receive, Scope, Send
 
@@ -31,11 +36,18 @@ from webmap.server.files import (
     is_worth_compressing,
     read_below,
 )
-from webmap.server.html import FOLDER, base_of, make_page, prepare_page
+from webmap.server.html import base_from, make_page, prepare_page, relative
 from webmap.server.open_pages import OpenPages
 from webmap.server.outbox import BatchedCallsByLoop
 from webmap.server.own_files import own_files
-from webmap.server.security import PAGE_KEY, SANDBOX, VIEWER, Security, plain
+from webmap.server.security import (
+    MARKS,
+    PAGE_KEY,
+    SANDBOX,
+    VIEWER,
+    Security,
+    plain,
+)
 from webmap.server.sockets import ConnectToGate, DriveSockets, SceneSockets, find_page
 
 log = logging.getLogger("webmap.server")
@@ -114,9 +126,10 @@ class WebApp:
     async def watch_people(self) -> None:
         """End the sockets of people whose session has ended, soon after that."""
         people, trouble = self.settings.people, ""
-        while people is not None:
+        while self.settings.lasts is not None:
             try:
-                await asyncio.to_thread(people.refresh)
+                if people is not None:
+                    await asyncio.to_thread(people.refresh)
                 trouble = ""
             except Exception as error:  # or sessions would never end again
                 if str(error) != trouble:
@@ -126,18 +139,21 @@ class WebApp:
             await asyncio.sleep(_PEOPLE_S)
 
     def _end_sockets(self) -> None:
-        if self.settings.people is not None:
+        lasts = self.settings.lasts
+        if lasts is not None:
             for sockets in self._sockets:
-                sockets.end_unless(self.settings.people.viewer)
+                sockets.end_unless(lasts)
 
     async def _sign_out(self, request: Request) -> Response:
+        viewer, at_proxy = request.scope[VIEWER], self.settings.proxy_users
+        log.info("%s signed out", viewer.operator.logged)
+        shift_log.note("sign-in", "signed out", person=viewer.operator)
         if self.settings.people is not None:
-            viewer = request.scope[VIEWER]
-            log.info("%s signed out", viewer.operator.logged)
-            shift_log.note("sign-in", "signed out", person=viewer.operator)
             await asyncio.to_thread(self.settings.people.end, viewer.id)
             self._end_sockets()
-        return Response(status_code=204)
+        if at_proxy is None:
+            return Response(status_code=204)
+        return PlainTextResponse(at_proxy.sign_out_url)
 
     async def _static(self, request: Request) -> Response:
         name = request.path_params["name"]
@@ -253,8 +269,7 @@ class PageAnswers:
             return await self._page(request, entry)
         entry = find_page(self._site, other_spelling(path))
         if entry is not None:
-            root = base_of(request.scope.get("root_path", "")).removesuffix(FOLDER)
-            return RedirectResponse(root + entry.path, 308)
+            return RedirectResponse(relative("/" + path, entry.path), 308)
         return await answer_file(
             request, self._gzip, lambda: self._folder_file("/" + path)
         )
@@ -263,17 +278,16 @@ class PageAnswers:
         return await asyncio.to_thread(self._page_now, request, entry)
 
     def _page_now(self, request: Request, entry: PageEntry) -> Response:
-        base = base_of(request.scope.get("root_path", ""))
-        files = f"{base}v-{own_files.version()}/"
-        key = request.scope.get(PAGE_KEY)
+        files = f"{base_from(entry.path)}v-{own_files.version()}/"
+        key, marks = request.scope.get(PAGE_KEY), request.scope.get(MARKS, ())
         if entry.html is None:
-            return self._html(request, make_page(entry.title, files, key), key)
+            return self._html(request, make_page(entry.title, files, key, marks), key)
         try:
             text = entry.html.read_text("utf-8-sig")
         except (OSError, UnicodeDecodeError) as error:
             log.error("page %s: cannot read %s: %s", entry.path, entry.html, error)
             return plain(500, "The HTML file of this page cannot be read as UTF-8.")
-        page = prepare_page(text, files, key)
+        page = prepare_page(text, files, key, marks)
         self._warn(entry.html, page.blocked)
         return self._html(request, page.text, key)
 

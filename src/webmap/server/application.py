@@ -117,6 +117,14 @@ def run(
     tls_cert: str | Path = "",
     tls_key: str | Path = "",
     insecure_lan: bool = False,
+    public_url: str = "",
+    trusted_proxies: Iterable[str] = (),
+    proxy_user_header: str = "",
+    proxy_groups_header: str = "",
+    proxy_roles: Iterable[str] = (),
+    sign_out_url: str = "",
+    embed_from: Iterable[str] = (),
+    embed_driving: bool = False,
     max_pages: int = 100,
     frame_rate: float = FRAME_RATE,
 ) -> None:
@@ -139,6 +147,17 @@ def run(
         tls_key: The file with its private key in PEM, without a password.
         insecure_lan: Whether other machines may be served without TLS, so that
             everybody on the network in between can read the token.
+        public_url: The address at which browsers see WebMap behind a proxy, such as
+            ``https://example.com/robots``.
+        trusted_proxies: Addresses whose headers count: what they forward, and below.
+        proxy_user_header: The header in which a proxy names who has signed in there, in
+            place of the token; from trusted proxies alone.
+        proxy_groups_header: The header with the groups of the person, with commas.
+        proxy_roles: What each group may do, such as ``"drivers=operator:bay2/*"`` or
+            ``"*=viewer"``; the first one that a person has counts.
+        sign_out_url: Where a person signs out at the proxy.
+        embed_from: Origins whose pages may show WebMap in a frame; needs TLS.
+        embed_driving: Whether robots may be driven there, not only seen and stopped.
         max_pages: The greatest number of open pages, at least 1.
         frame_rate: Frames a second for each page at most, from 1 to 60. Fewer let one
             display serve more pages; ticks and commands are as fast as ever.
@@ -153,6 +172,11 @@ def run(
     options: dict[str, Any] = {"host": host, "port": port}
     options |= {"open_browser": open_browser, "insecure_lan": insecure_lan}
     options |= {"tls": tls, "tls_cert": tls_cert, "tls_key": tls_key}
+    options |= {"public_url": public_url, "trusted_proxies": trusted_proxies}
+    options |= {"proxy_user_header": proxy_user_header, "proxy_roles": proxy_roles}
+    options |= {"proxy_groups_header": proxy_groups_header}
+    options |= {"sign_out_url": sign_out_url}
+    options |= {"embed_from": embed_from, "embed_driving": embed_driving}
     options |= command_line
     runtime.frame_rate = _checked_rate(frame_rate)
     _serve(token=token, max_pages=_checked_pages(max_pages), **options)
@@ -179,14 +203,23 @@ def _serve(
     tls_cert: str | Path,
     tls_key: str | Path,
     insecure_lan: bool,
+    public_url: str,
+    trusted_proxies: Iterable[str],
+    proxy_user_header: str,
+    proxy_groups_header: str,
+    proxy_roles: Iterable[str],
+    sign_out_url: str,
+    embed_from: Iterable[str],
+    embed_driving: bool,
     token: str | None,
     max_pages: int,
 ) -> None:
     from webmap.base.tls import Renewal, tls_files
     from webmap.gate.locks import state_folder
     from webmap.server.access import Settings
-    from webmap.server.origins import Hosts
+    from webmap.server.origins import Hosts, checked_origin, is_loopback
     from webmap.server.people import People, UserFile
+    from webmap.server.proxy import Grant, Proxies, ProxyUsers
     from webmap.server.runner import (
         announce,
         browser_at,
@@ -199,11 +232,31 @@ def _serve(
     find = tls_files(host, state_folder() / "tls", tls, tls_cert, tls_key)
     certificate = find and Renewal(find)
     check_exposure(host, tls=certificate is not None, insecure_lan=insecure_lan)
+    proxies = Proxies.of(public_url, trusted_proxies)
     settings: dict[str, Any] = {
-        "hosts": Hosts.of_binding(host),
+        "hosts": Hosts.of_binding(host, proxies.names),
+        "origins": frozenset(filter(None, [proxies.origin])),
+        "proxies": proxies,
         "max_pages": max_pages,
+        "embed_from": frozenset(map(checked_origin, embed_from)),
+        "embed_driving": embed_driving,
     }
-    if UserFile(state_folder()).read():
+    encrypted = certificate is not None or proxies.origin.startswith("https:")
+    if settings["embed_from"] and not encrypted and not is_loopback(host):
+        raise ConfigError("browsers show WebMap in a frame of another page with TLS")
+    if proxy_user_header:
+        if not proxies.trusted:
+            raise ConfigError(
+                f"everybody could send {proxy_user_header}: name the address of the "
+                "proxy, as --trusted-proxy 127.0.0.1"
+            )
+        settings["proxy_users"] = ProxyUsers(
+            proxy_user_header,
+            tuple(map(Grant.read, proxy_roles)),
+            proxy_groups_header,
+            sign_out_url,
+        )
+    elif UserFile(state_folder()).read():
         people = settings["people"] = People(state_folder())
         token = people.secret
     if token is not None:
@@ -222,7 +275,7 @@ def _serve(
                 certificate.files.fingerprint,
             )
         if open_browser:
-            code = "" if app.settings.people else app.new_code()
+            code = app.new_code() if app.settings.has_token else ""
             browser.enter_context(browser_at(url.partition("?")[0], code))
 
     try:
@@ -272,7 +325,10 @@ def _connect_to_gate(
     send: Callable[[str], None],
     close: Callable[[str], None],
     identity: "Identity",
+    may_drive: Callable[[str], bool] | None,
 ) -> "GateConnection":
     if runtime.gate is None:
         raise WebMapError("WebMap has not been started: call webmap.start()")
-    return runtime.gate.connect(name, role, send, close, identity=identity)
+    return runtime.gate.connect(
+        name, role, send, close, identity=identity, may_drive=may_drive
+    )

@@ -43,7 +43,7 @@ class Token:
 
     """
 
-    __slots__ = ("_cookie_secret", "_digest", "_key_secret")
+    __slots__ = ("_cookie_secret", "_digest", "_frame_secret", "_key_secret")
 
     def __init__(self, secret: str) -> None:
         if not _TOKEN.fullmatch(secret):
@@ -56,6 +56,7 @@ class Token:
         self._digest = hashlib.sha256(secret.encode()).digest()
         self._cookie_secret = _derive(secret, b"webmap session v1")
         self._key_secret = _derive(secret, b"webmap page key v1")
+        self._frame_secret = _derive(secret, b"webmap frame key v1")
 
     def matches(self, offered: str) -> bool:
         """Return in constant time whether ``offered`` is the token."""
@@ -70,13 +71,19 @@ class Token:
         """Return the session of a valid cookie value, or None."""
         return _proved(self._cookie_secret, cookie)
 
-    def key(self, session: str) -> str:
-        """Return the key with which the pages of a session open their sockets."""
-        return _signed(self._key_secret, session)
+    def key(self, session: str, *, framed: bool = False) -> str:
+        """Return the key with which the pages of a session open their sockets.
 
-    def session_of_key(self, key: str) -> str | None:
-        """Return the session of a valid page key, or None."""
-        return _proved(self._key_secret, key)
+        Args:
+            session: The session.
+            framed: Whether the key is for a frame, in which nobody drives.
+
+        """
+        return _signed(self._frame_secret if framed else self._key_secret, session)
+
+    def session_of_key(self, key: str, *, framed: bool = False) -> str | None:
+        """Return the session of a valid page key, or None; see :meth:`key`."""
+        return _proved(self._frame_secret if framed else self._key_secret, key)
 
 
 def _derive(secret: str, label: bytes) -> bytes:

@@ -6,10 +6,10 @@ own files that the page loads by itself get the address of their version.
 """
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from html import escape
 from html.parser import HTMLParser
-from urllib.parse import quote
 
 from webmap.server.access import KEY
 from webmap.server.bundles import STARTS
@@ -47,24 +47,39 @@ _OWN = re.compile(f"(_webmap/)(?={'|'.join(FOLDERS)})")
 _LOADS = {"script": "src", "img": "src", "link": "href", "iframe": "src"}
 
 
-def base_of(root_path: str) -> str:
-    """Return the URL of WebMap's own files, ending in a slash."""
-    return quote(root_path.rstrip("/")) + FOLDER
+def base_from(path: str) -> str:
+    """Return the URL of WebMap's own files, ending in a slash, for a page.
+
+    It is relative: a proxy in front may add a prefix which nobody has stated.
+
+    Args:
+        path: The path of the page from the application's root.
+
+    """
+    return relative(path, FOLDER)
 
 
-def make_page(title: str, base: str, key: str | None = None) -> str:
+def relative(path: str, to: str) -> str:
+    """Return a path of the application as a URL relative to another one."""
+    return "./" + "../" * (path.count("/") - 1) + to.lstrip("/")
+
+
+def make_page(
+    title: str, base: str, key: str | None = None, marks: Iterable[str] = ()
+) -> str:
     """Return a page with one container that fills the window.
 
     Args:
         title: The page's title.
-        base: The URL of WebMap's own files: that of :func:`base_of`, and a version.
+        base: The URL of WebMap's own files: that of :func:`base_from`, and a version.
         key: The page's key, if it has just signed in.
+        marks: The names of empty elements for the page's script.
 
     """
     return _MADE.format(
         title=escape(title),
         base=escape(base),
-        key=_key_element(key),
+        key=_for_script(key, marks),
         preloads=_preloads(base),
         scripts=_scripts(base),
     )
@@ -91,8 +106,9 @@ def _scripts(base: str) -> str:
     )
 
 
-def _key_element(key: str | None) -> str:
-    return "" if key is None else f'<meta name="{KEY}" content="{escape(key)}">'
+def _for_script(key: str | None, marks: Iterable[str]) -> str:
+    stated = "" if key is None else f'<meta name="{KEY}" content="{escape(key)}">'
+    return stated + "".join(f'<meta name="{mark}">' for mark in marks)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,18 +120,21 @@ class OwnPage:
     """What the Content-Security-Policy will block, in sentences, with line numbers."""
 
 
-def prepare_page(text: str, base: str, key: str | None = None) -> OwnPage:
+def prepare_page(
+    text: str, base: str, key: str | None = None, marks: Iterable[str] = ()
+) -> OwnPage:
     """Insert the base style sheet and the page's script into a user's HTML.
 
     Args:
         text: The user's whole HTML.
-        base: The URL of WebMap's own files: that of :func:`base_of`, and a version.
+        base: The URL of WebMap's own files: that of :func:`base_from`, and a version.
         key: The page's key, if it has just signed in.
+        marks: The names of empty elements for the page's script.
 
     """
     version = base.rpartition(FOLDER)[2]
     seen = _Reader(text)
-    first, last = _key_element(key), ""
+    first, last = _for_script(key, marks), ""
     if not seen.has("web/webmap.css"):
         first += f'<link rel="stylesheet" href="{escape(base)}web/webmap.css">'
     first += _preloads(base)

@@ -399,6 +399,9 @@ class OpenPages:
 
     def host(self, key: PageKey, viewer: Viewer) -> PageHost:
         """Return the page of that key: the kept one, or a new one."""
+        kept = self._hosts.get(key)
+        if kept is not None and kept.viewer != viewer:  # with other rights
+            kept.close()
         if key not in self._hosts:
             self._make_room()
             self._hosts[key] = host = PageHost(self, self.pages[key[0]], key, viewer)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from webmap.server.access import PROTOCOL
+from webmap.server.access import FRAME, PROTOCOL
 from webmap.server.outbox import BatchedCalls, DriveQueue, FrameQueue
 
 log = logging.getLogger("webmap.server")
@@ -331,9 +331,14 @@ class PageSocket:
 
 
 def page_id_of(query: Mapping[str, str]) -> str | None:
-    """Return a page's identifier; None if it is not valid."""
+    """Return a page's identifier; None if it is not valid.
+
+    A page in a frame is no page that was open in a tab before, with other rights.
+    """
     page_id = query.get("id", "")
-    return page_id if _PAGE_ID.fullmatch(page_id) else None
+    if not _PAGE_ID.fullmatch(page_id):
+        return None
+    return f"{FRAME}-{page_id}" if FRAME in query else page_id
 
 
 def short(reason: str) -> str:

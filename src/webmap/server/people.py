@@ -13,7 +13,7 @@ import logging
 import secrets
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -22,7 +22,7 @@ import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.base.plain_files import LARGEST_STATE, read_file, write_file
-from webmap.base.roles import Role
+from webmap.base.roles import ALL_ROBOTS, Role, checked_patterns
 from webmap.core.operators import (
     MOST_NAME,
     RESERVED,
@@ -60,6 +60,8 @@ class UserEntry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The hash of the password, by Argon2."""
     role: Role = "viewer"
     """What the user may do: look, drive too, or administer too."""
+    robots: tuple[str, ...] = ALL_ROBOTS
+    """Which robots the user may drive; see :class:`webmap.core.operators.Viewer`."""
 
 
 class _File(msgspec.Struct, forbid_unknown_fields=True):
@@ -113,9 +115,10 @@ class UserFile:
             users = msgspec.toml.decode(data, type=_File).users
         except (msgspec.DecodeError, UnicodeDecodeError) as error:
             raise ConfigError(f"{self.path}: {error}") from None
-        for name in users:
+        for name, user in users.items():
             try:
                 checked_user(name)
+                checked_patterns(user.robots)
             except ConfigError as error:
                 raise ConfigError(f"{self.path}: {error}") from None
         return users
@@ -134,16 +137,19 @@ class UserFile:
                 "",
                 f"[users.{json.dumps(name)}]",
                 f"role = {json.dumps(user.role)}",
+                f"robots = {json.dumps(user.robots)}",
                 f"password = {json.dumps(user.password)}",
             ]
         write_file(self.path, "\n".join([*lines, ""]).encode())
 
-    def add(self, name: str, role: Role, password: str) -> None:
+    def add(
+        self, name: str, role: Role, password: str, robots: Iterable[str] = ALL_ROBOTS
+    ) -> None:
         """Add a user.
 
         Raises:
-            ConfigError: If the name or the password is not valid, or a user has a name
-                that looks like this one.
+            ConfigError: If the name, the password or a pattern of robots is not valid,
+                or a user has a name that looks like this one.
 
         """
         users = self.read()
@@ -152,21 +158,35 @@ class UserFile:
             raise ConfigError(
                 f"there is a user {found!r}, whose name looks like {name!r}"
             )
-        self.write(users | {name: UserEntry(hash_of(password), role)})
+        entry = UserEntry(hash_of(password), role, checked_patterns(robots))
+        self.write(users | {name: entry})
 
     def change(
-        self, name: str, *, password: str | None = None, role: Role | None = None
+        self,
+        name: str,
+        *,
+        password: str | None = None,
+        role: Role | None = None,
+        robots: Iterable[str] = (),
     ) -> None:
         """Change a user, which ends the sessions of the user.
 
+        Args:
+            name: The name of the user.
+            password: The new password.
+            role: The new role.
+            robots: Which robots the user may drive from now on.
+
         Raises:
-            ConfigError: If there is no such user, or the password is not valid.
+            ConfigError: If there is no such user, or what is new is not valid.
 
         """
         users = self.read()
         old = users[self.known(users, name)]
         changed = UserEntry(
-            old.password if password is None else hash_of(password), role or old.role
+            old.password if password is None else hash_of(password),
+            role or old.role,
+            checked_patterns(robots or old.robots),
         )
         self.write(users | {name: changed})
 
@@ -295,8 +315,8 @@ class People:
             found = self._sessions.get(_name_of(session))
             if found is None or not self._lasts(found):
                 return None
-            role = self._users[found.user].role
-            return Viewer(session, found.user, role, signs_out=True)
+            user = self._users[found.user]
+            return Viewer(session, found.user, user.role, True, user.robots)
 
     def sign_in(self, name: str, password: str, address: str) -> str | Denied:
         """Return a new session; takes a tenth of a second and 64 MiB.
@@ -444,7 +464,10 @@ def _fits(hash: str, password: str) -> bool:
 
 
 def _proof(user: UserEntry) -> str:
-    return hashlib.sha256(f"{user.role}\n{user.password}".encode()).hexdigest()[:32]
+    # As before there were patterns, so that a new version ends no session.
+    robots = "" if user.robots == ALL_ROBOTS else "\n" + json.dumps(user.robots)
+    text = f"{user.role}\n{user.password}{robots}"
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def _name_of(session: str) -> str:

@@ -147,7 +147,10 @@ def serve(
     return_large_pieces()
     listener = listener or listen(host, port)
     url = url_of(listener, host, tls=tls is not None)
-    if not app.settings.authenticate and not app.settings.people:
+    proxies = app.settings.proxies
+    if proxies.origin:
+        url = f"{proxies.origin}{proxies.base}/"
+    if app.settings.has_token:
         url += f"?token={app.settings.token}"
     server = make_server(app, lambda: on_ready(url), tls)
     try:

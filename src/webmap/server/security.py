@@ -10,10 +10,11 @@ import hashlib
 import inspect
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from html import escape
 from http import HTTPStatus
-from urllib.parse import parse_qsl
+from urllib.parse import parse_qsl, urlencode
 
 from starlette.responses import HTMLResponse, PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -30,7 +31,7 @@ from webmap.server.access import (
     redact,
 )
 from webmap.server.connections import connection_of
-from webmap.server.html import FOLDER, base_of
+from webmap.server.html import FOLDER, base_from, relative
 
 log = logging.getLogger("webmap.server")
 
@@ -52,17 +53,23 @@ HEADERS = (
 # An image opened by itself is a document; it must never run scripts.
 SANDBOX = CONTENT_SECURITY_POLICY + "; sandbox"
 
+_NO_FRAME = b"frame-ancestors 'none'"
+
 _STARTS = {"http.response.start", "websocket.http.response.start"}
 
 
-def with_headers(send: Send, cookie: str | None = None) -> Send:
+def with_headers(
+    send: Send, cookie: str | None = None, embed_from: Iterable[str] = ()
+) -> Send:
     """Return ``send`` with the headers added that an answer lacks.
 
     Args:
         send: Sends the answer.
         cookie: A whole Set-Cookie header, which is added too.
+        embed_from: Origins whose pages may show the answer in a frame.
 
     """
+    ancestors = f"frame-ancestors {' '.join(embed_from)}".encode()
 
     async def send_with_headers(message: Message) -> None:
         if message["type"] in _STARTS:
@@ -73,6 +80,8 @@ def with_headers(send: Send, cookie: str | None = None) -> Send:
             ]
             present = {name.lower() for name, _ in headers}
             headers += [header for header in HEADERS if header[0] not in present]
+            if embed_from:
+                headers = [(k, v.replace(_NO_FRAME, ancestors)) for k, v in headers]
             if b"cache-control" not in present:
                 headers.append((b"cache-control", b"no-store"))
             if cookie is not None:
@@ -109,15 +118,19 @@ def refuse(
     return response
 
 
-def redirect(to: Redirect) -> Response:
-    """Return the redirect to a URL without the token."""
+def redirect(request: RequestHead, to: Redirect) -> Response:
+    """Return the redirect to a URL without the token, relative to that of a request."""
     response = Response(status_code=HTTPStatus.SEE_OTHER)
-    response.headers["location"] = to.location
+    response.headers["location"] = relative(request.path, to.location)
     return response
 
 
 VIEWER = "webmap.viewer"
 """The key of the scope with the viewer who makes a request."""
+
+MARKS = "webmap.marks"
+"""The key of the scope with what the page's script must know, as names of elements:
+that it is in a frame, and that it must ask again whether its person is signed in."""
 
 PAGE_KEY = "webmap.page_key"
 """The key of the scope with the page's key, if the request signs in."""
@@ -133,7 +146,8 @@ class Security:
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._app = app
-        self._authenticate = settings.authenticate
+        self._settings = settings
+        self._authenticate = settings.authenticate or settings.proxy_users
         self._named = settings.people is not None
         # One at a time, so that strangers keep no other thread busy.
         self._signing_in = asyncio.Lock()
@@ -145,25 +159,31 @@ class Security:
         if scope["type"] not in {"http", "websocket"}:
             await self._app(scope, receive, send)
             return
+        scope = self._settings.proxies.seen(scope)
         request = RequestHead.of(scope)
+        embed_from = sorted(self._settings.embed_from)
         if self._authenticate is None:
             redact(scope)
         who = await self._who(request, scope, receive)
         if isinstance(who, SignedIn):
             scope[PAGE_KEY] = who.key
-            send = with_headers(send, who.cookie)
+            send = with_headers(send, who.cookie, embed_from)
             who = who.viewer
             by, at = who.operator, request.address
             shift_log.note("sign-in", "signed in", person=by, role=who.role, address=at)
         else:
-            send = with_headers(send)
+            send = with_headers(send, None, embed_from)
         if isinstance(who, Viewer):
+            if request.framed and not self._settings.embed_driving:
+                who = replace(who, role="viewer")
             scope[VIEWER] = who
+            asks = self._settings.proxy_users is not None
+            scope[MARKS] = ("webmap-frame",) * request.framed + ("webmap-ask",) * asks
             connection = connection_of(scope)
             with connection.serving() if connection else contextlib.nullcontext():
                 await self._app(scope, receive, send)
         elif isinstance(who, Redirect):
-            await redirect(who)(scope, receive, send)
+            await redirect(request, who)(scope, receive, send)
         else:
             _log_refusal(who, request, scope)
             if request.tokens() or (self._named and _is_sign_in(request, scope)):
@@ -189,6 +209,10 @@ class Security:
         refusal = self._access.check_address(request)
         if refusal is not None:
             return refusal
+        if request.reads and request.root and request.path == request.root:
+            # The page's own addresses are relative to a path that ends in a slash.
+            query = f"?{urlencode(request.query)}" if request.query else ""
+            return Redirect(f"{request.root}/{query}")
         if self._named and _is_sign_in(request, scope):
             name, password, path = await _typed(receive)
             sign_in = self._access.sign_in_user
@@ -205,8 +229,9 @@ class Security:
 
     def _form(self, request: RequestHead, scope: Scope) -> str:
         path = "" if _is_sign_in(request, scope) else request.path
+        below = request.path.removeprefix(request.root)
         return _ASK_NAME.format(
-            action=escape(f"{base_of(request.root)}{SIGN_IN}"), path=escape(path)
+            action=escape(f"{base_from(below)}{SIGN_IN}"), path=escape(path)
         )
 
 

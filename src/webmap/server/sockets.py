@@ -147,10 +147,19 @@ class SceneSockets:
 
 
 ConnectToGate = Callable[
-    [str, Role, Callable[[str], None], Callable[[str], None], Identity], GateConnection
+    [
+        str,
+        Role,
+        Callable[[str], None],
+        Callable[[str], None],
+        Identity,
+        Callable[[str], bool] | None,
+    ],
+    GateConnection,
 ]
-"""Opens a connection to the gate for a viewer's name, role and identity. The two
-callbacks send to the page and close its socket; they may be called from any thread."""
+"""Opens a connection to the gate for a viewer's name, role and identity. Two callbacks
+send to the page and close its socket, and one, unless the viewer may drive every robot,
+returns whether it may drive this one; they may be called from any thread."""
 
 MOST_STOP_ONLY = 32
 """The greatest number of pages that can only stop; each new one gets a place."""
@@ -277,6 +286,7 @@ class DriveSockets:
             page_socket.offer,
             close,
             operators.identity(viewer, page_id),
+            None if "*" in viewer.robots else viewer.may_drive,
         )
 
 

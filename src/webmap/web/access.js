@@ -8,6 +8,21 @@ export const OWN_FILES = new URL("..", import.meta.url);
 /** The URL below which WebMap serves files and sockets; its own files, of any version. */
 export const BASE = new URL(/\/v-\w+\/$/.test(OWN_FILES.pathname) ? ".." : ".", OWN_FILES);
 
+const { document: page, top = globalThis } = globalThis;
+
+/** Whether this page is in a frame: as the server states it, or the browser. */
+export const FRAMED = hasMark("webmap-frame") || top !== globalThis;
+
+/** Milliseconds between two questions whether the person is still signed in at a proxy. */
+const ASK_EVERY = 60_000;
+
+if (hasMark("webmap-ask")) setInterval(() => void whyRefused(), ASK_EVERY);
+
+/** @param {string} name Of an empty element in the head of the page. */
+function hasMark(name) {
+  return Boolean(page?.querySelector(`meta[name="${name}"]`));
+}
+
 /**
  * Resolve an address from the server to a file of the page.
  *
@@ -34,7 +49,7 @@ export function resolve(address, base) {
 export function socketAddress(path, query) {
   const url = new URL(path, BASE);
   url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
-  url.search = new URLSearchParams(query).toString();
+  url.search = new URLSearchParams(FRAMED ? { ...query, frame: "" } : query).toString();
   return url;
 }
 
@@ -48,9 +63,10 @@ export function pagePath() {
 /**
  * The storage belongs to one origin, so a server on another port of the same host,
  * which receives WebMap's cookie, cannot read the key. WebMap may have several prefixes
- * there.
+ * there, and a page in a frame has a key of its own.
  */
-const NAME = `webmap key ${BASE.pathname}`;
+const TAB = `webmap key ${BASE.pathname}`;
+const NAME = FRAMED ? `webmap frame key ${BASE.pathname}` : TAB;
 
 /** The key of this page; a browser may block its storage. */
 let received = "";
@@ -76,7 +92,8 @@ export function takeKey() {
 /** @returns {string} The newest key, which another tab may have received. */
 function key() {
   try {
-    return localStorage.getItem(NAME) ?? received;
+    // A frame on the same site may have the key of a tab; it states that it is a frame.
+    return localStorage.getItem(NAME) ?? (received || localStorage.getItem(TAB)) ?? "";
   } catch {
     return received;
   }
@@ -110,13 +127,17 @@ export async function whyRefused() {
 }
 
 /**
- * End this browser's session, on all its pages; robots that they drive stop.
+ * End this browser's session, on all its pages; robots that they drive stop. Then the
+ * page is loaded again, or that where a person signs out at a proxy.
  *
  * @returns {Promise<string>} Why that failed; empty if it did not.
  */
 export async function signOut() {
   try {
     const answer = await post("sign-out");
+    const next = answer.ok ? (await answer.text()).trim() : "";
+    if (next) location.assign(next);
+    else if (answer.ok) location.reload();
     return answer.ok ? "" : `You are still signed in: the server answered ${answer.status}.`;
   } catch {
     return "You are still signed in: the server does not answer.";

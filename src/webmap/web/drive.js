@@ -1,3 +1,4 @@
+import { FRAMED } from "./access.js";
 import { devicesOf } from "./inputs/devices.js";
 import { attentive, watchAttention } from "./inputs/focus.js";
 import { PoseCommands } from "./motion/commands.js";
@@ -388,6 +389,7 @@ export class Drive {
  */
 function socketUrl(baseUrl, id) {
   const url = new URL("drive", baseUrl);
+  if (FRAMED) url.searchParams.set("frame", "");
   if (id !== undefined) url.searchParams.set("id", id);
   url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
   return url;

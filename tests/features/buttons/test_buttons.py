@@ -462,7 +462,10 @@ def test_a_viewer_sees_a_disabled_button_and_cannot_press_it(
     (holder,) = page.element("here").children
     go = next(e for e in holder.walk() if getattr(e, "tag", "") == "button")
     assert go.get("disabled") is not None
-    assert go.get("title") == "Not available: only operators can press this button"
+    assert (
+        go.get("title")
+        == "Not available: only operators of this robot can press this button"
+    )
     (handler,) = go.handlers("click")
     asyncio.run(handler(Event(kind="click")))
     assert module["Dock"].state == "idle"

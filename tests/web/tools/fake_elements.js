@@ -43,6 +43,7 @@ export class FakeElement extends EventTarget {
 }
 
 globalThis.document = {
+  querySelector: () => null,
   createElement: () => new FakeElement(),
   createElementNS: () => new FakeElement(),
 };

@@ -140,6 +140,8 @@ class AlignTool:
             )
         concerned = self._together(robot) if whole else [robot]
         for each in concerned:
+            if not self.map.page.viewer.may_drive(each.id):
+                return f"Only admins of {each.name} can align it."
             if each.report is not None and each.report.state in MOVING:
                 return f"{each.name} is being driven. Align it when it is free."
         return None

@@ -23,9 +23,6 @@ from webmap.scene.element import Element, Event
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
 
-MAY_PRESS = ("operator", "admin")
-"""Roles that may press buttons."""
-
 MIN_QUESTION_TIME = 0.3
 """Seconds before the answer to a question counts, against double clicks."""
 
@@ -89,8 +86,8 @@ class ButtonView:
         self._result.text = _result_text(button, by, why)
 
     def _why_disabled(self) -> str | None:
-        if self._viewer.role not in MAY_PRESS:
-            return "only operators can press this button"
+        if not self._viewer.may_drive(self.button.robot.id):
+            return "only operators of this robot can press this button"
         why, by = self.button.why_disabled, self.button.by
         return why and why.replace(f"by {by}", f"by {self._viewer.calls(by)}")
 

@@ -1,3 +1,4 @@
+import { FRAMED } from "../../web/access.js";
 import { devicesOf } from "../../web/inputs/devices.js";
 import { stoppingDistance } from "../../web/motion/measurements.js";
 import { heldByAnother, isLatched, mayTake, stopOf } from "../../web/motion/report.js";
@@ -19,6 +20,12 @@ import { Panel, Requests, StickPad } from "./teleop_panel.js";
 
 /** The detail of a robot that could be driven, for a person who may not drive. */
 const LOOKS = "You may look and press STOP. An operator can drive.";
+
+/** The same in a frame of another page. */
+const IN_FRAME = "You may look and press STOP. To drive, open WebMap in a tab of its own.";
+
+/** The same for an operator of other robots. */
+const NOT_YOURS = "You may look and press STOP. The robot's own operators can drive.";
 
 /**
  * Drive the selected robot with keys, an on-screen stick or a gamepad, and show the
@@ -172,7 +179,8 @@ class Teleop {
     const verdict = this._drive.verdicts.find((one) => one.robot === robot);
     const request = requests.find((one) => one.robot === robot);
     this._requests.show(requests);
-    const useful = !this._looks && report !== null && isStickUseful(report);
+    const looks = this._looks || report?.looks === true;
+    const useful = !looks && report !== null && isStickUseful(report);
     this._stick.holonomic = this._drivingMap.holonomic;
     this._stick.show(useful, status.pressed && status.blocked);
     const pointers = { touch: this._touch.matches, stick: this._stick.wanted };
@@ -184,11 +192,11 @@ class Teleop {
     const idle = words.state === "free" || words.state === "ready";
     if (idle && this._devices.codeless) words.detail = NO_POSITIONS;
     const invites = idle || words.detail.startsWith("To drive");
-    if (this._looks && invites) words.detail = LOOKS;
+    if (looks && invites) words.detail = !this._looks ? NOT_YOURS : FRAMED ? IN_FRAME : LOOKS;
     this._panel.showState(withoutKeys(words, pointers, inputs), report, status.delay);
     const asking = request?.by === status.connection;
     const stick = useful ? this._stick.wanted : null;
-    this._panel.showButtons(report, asking, stick, this._looks);
+    this._panel.showButtons(report, asking, stick, looks);
     const moving = robot === null ? null : this._drive.motionDelay(robot);
     // Reports from before the connection was lost do not describe the present.
     const current = status.link === "lost" ? null : report;

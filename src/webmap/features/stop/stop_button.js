@@ -137,7 +137,8 @@ class Stop {
     const { robots, verdicts } = this._drive;
     const standing = standingStops(robots.values());
     setText(this._standing, [standing, ...this._refusals()].join(" "));
-    const latched = [...robots.values()].filter(isLatched).map(stopKey);
+    const stopped = [...robots.values()].filter(isLatched);
+    const latched = stopped.filter(({ looks }) => !looks).map(stopKey);
     const reset = latched.length > 1 ? "Reset all" : "Reset";
     this._reset.show(latched.length > 0, latched, reset);
     setHidden(this._close, verdicts.length === 0);

@@ -93,7 +93,9 @@ class GateClient:
     ) -> None:
         self._lock = threading.RLock()
         self._supervisor = link(self, self._lock)
-        self._pages = Pages(self.send, self._lock, self._heed, agent, prefix)
+        self._pages = Pages(
+            self.send, self._lock, self._heed, self._report, agent, prefix
+        )
         self._program = ProgramCommands(
             self.send, self._lock, connection=f"{prefix}{protocol.PROGRAM}"
         )
@@ -154,6 +156,7 @@ class GateClient:
         close: Callable[[str], None],
         id: str = "",
         identity: protocol.Identity | None = None,
+        may_drive: Callable[[str], bool] | None = None,
     ) -> DriveConnection:
         """Register a page's socket with the gate.
 
@@ -164,12 +167,14 @@ class GateClient:
             close: Called with the reason to close the socket, in the same thread.
             id: Its id at another gate, which the page knows.
             identity: That of the user and the page, if the page shows who "you" are.
+            may_drive: Returns whether the user may command a robot; asked for each
+                command, so that changes count at once. None for every robot.
 
         Raises:
             ConfigError: If there is no such role.
 
         """
-        return self._pages.connect(name, role, send, close, id, identity)
+        return self._pages.connect(name, role, send, close, id, identity, may_drive)
 
     def show_again(self, connection: DriveConnection) -> None:
         """Send a page the newest report of every robot."""

@@ -79,6 +79,10 @@ comes when something changed, velocities at 10 Hz at most. Its fields:
     The stop hooks that failed or have not run yet, and why, one sentence each:
     ``"stop hook /e_stop: no answer within 2 s"``.
 
+``looks``
+    True if the person of the page may only look at this robot and press STOP, and then
+    it takes no goals from this page either; left out otherwise.
+
 ``refused`` names in ``what`` the refused ``op``, or ``"command"`` for an invalid
 command (``robot`` is then null), or ``"lease"`` when a lease has ended. The same
 refusal is sent once a second at most.
@@ -92,6 +96,7 @@ A tick and a report of a robot whose gate is that of an agent have one more fiel
 import itertools
 import logging
 import threading
+import time
 from collections.abc import Callable
 from typing import Any, get_args
 
@@ -99,10 +104,10 @@ import msgspec
 from msgspec.structs import replace
 
 from webmap.base.errors import ConfigError, MotionError
-from webmap.base.roles import Role
+from webmap.base.roles import NOT_YOURS, Role
 from webmap.base.text import isolated
 from webmap.gate import protocol
-from webmap.gate.commands import MoveFor
+from webmap.gate.commands import MoveFor, Refusal, Release, Stop, op_of, parse
 from webmap.gate.limits import Cap, Speed, offered, page_cap
 from webmap.gate.protocol import Hello, Identity, Refused, RobotGone, RobotReport
 
@@ -131,7 +136,13 @@ def tick_text(tick: int, ack: int, agent: str = "") -> str:
 
 
 def robot_text(
-    report: RobotReport, *, mine: bool, page: Cap, agent: str = "", prefix: str = ""
+    report: RobotReport,
+    *,
+    mine: bool,
+    page: Cap,
+    looks: bool = False,
+    agent: str = "",
+    prefix: str = "",
 ) -> str:
     """Return a robot's report for one page.
 
@@ -139,6 +150,7 @@ def robot_text(
         report: The report.
         mine: Whether the page has the lease.
         page: The page's own limit, which comes into force when it takes a free robot.
+        looks: Whether the person of the page may not drive this robot.
         agent: The agent whose gate it is; "" for the display's own.
         prefix: What the ids of this display's connections begin with at that gate.
 
@@ -147,6 +159,8 @@ def robot_text(
     del fields["type"]
     if agent:
         fields["gate"] = agent
+    if looks:
+        fields |= {"looks": True, "method": None, "cancels": False, "locates": False}
     for key in ("holder", "asker", "stop"):
         if fields[key] is not None:
             _localize(fields[key], prefix)
@@ -183,6 +197,9 @@ def _text(op: str, **fields: object) -> str:
 
 log = logging.getLogger("webmap.gate")
 
+COUNT_EVERY = 1.0
+"""Seconds between two reports of how many messages of a page were refused here."""
+
 TICKS = 20
 """Ticks a second."""
 
@@ -199,6 +216,7 @@ class DriveConnection:
         hello: protocol.Connect,
         send: Callable[[str], None],
         close: Callable[[str], None],
+        may_drive: Callable[[str], bool] | None = None,
     ) -> None:
         self.id = hello.connection
         self.greeted = False
@@ -212,13 +230,49 @@ class DriveConnection:
         """The page's own limit."""
         self._send = send
         self._close = close
+        self._may_drive = may_drive
+        self._refused, self._counted_at = 0, float("-inf")
 
     def receive(self, text: str | bytes) -> None:
-        """Pass a frame of the page to the gate, valid or not."""
+        """Pass a frame of the page to the gate, valid or not.
+
+        What commands a robot that the person may not drive ends here.
+        """
         # Text that is not Unicode is passed on, too: the gate refuses and counts it.
         data = text.encode("utf-8", "surrogatepass") if isinstance(text, str) else text
-        too_much = 2 * 1024  # refused as too long all the same
-        self._pages.forward(self.id, data[:too_much])
+        data = data[: 2 * 1024]  # refused as too long all the same
+        refused = None if self._may_drive is None else self._refusal(data)
+        if refused is None:
+            self._pages.forward(self.id, data)
+        else:
+            self._count(refused)
+            self.send_text(refused_text(refused))
+
+    def looks_at(self, robot: str) -> bool:
+        """Return whether the person may not drive a robot, only look and stop it."""
+        return self._may_drive is not None and not self._may_drive(robot)
+
+    def _refusal(self, data: bytes) -> Refused | None:
+        """Return the refusal of a message; None if the gate decides about it.
+
+        Everybody may stop a robot, and let it go.
+        """
+        try:
+            command = parse(data)
+        except Refusal:
+            return None  # the gate refuses it, and obeys a STOP that is malformed
+        if isinstance(command, Stop | Release) or not self.looks_at(command.robot):
+            return None
+        return Refused(self.id, command.robot, op_of(command), NOT_YOURS)
+
+    def _count(self, refused: Refused) -> None:
+        self._refused += 1
+        now = time.monotonic()
+        if now - self._counted_at >= COUNT_EVERY:
+            last = f"{refused.what}: {refused.why}"
+            count = protocol.RefusedCount(self._hello.name, self._refused, last)
+            self._refused, self._counted_at = 0, now
+            self._pages.report(count)
 
     def set_speeds(self, v: float, w: float) -> None:
         """Set the page's own speed limits, in m/s and rad/s."""
@@ -253,9 +307,12 @@ class DriveConnection:
             yaw: In radians.
 
         Raises:
-            MotionError: If the gate does not run.
+            MotionError: If the gate does not run, or the person may not drive the
+                robot.
 
         """
+        if self.looks_at(robot):
+            raise MotionError(f"the goal was not sent: {NOT_YOURS}")
         self._pages.move(self.id, robot, (x, y, yaw))
 
     @property
@@ -295,6 +352,7 @@ class Pages:
         send: Sends a message to the gate, if it runs.
         lock: Held while the state changes.
         heed: Called with each message of a page before the gate receives it.
+        report: Called with counts of messages that the gate does not receive.
         agent: The agent whose gate it is; "" for the display's own.
         prefix: What the id of each connection begins with.
 
@@ -305,6 +363,7 @@ class Pages:
         send: Callable[[protocol.ToGate], None],
         lock: "threading.RLock",
         heed: Callable[[protocol.FromPage], None],
+        report: Callable[[protocol.RefusedCount], None],
         agent: str = "",
         prefix: str = "",
     ) -> None:
@@ -313,6 +372,7 @@ class Pages:
         self.send = send
         self._lock = lock
         self._keep_stop_of_page = heed
+        self.report = report
         self._numbers = itertools.count(1)
         self._connections: dict[str, DriveConnection] = {}
         self._latest: dict[str, protocol.RobotReport] = {}
@@ -336,6 +396,7 @@ class Pages:
         close: Callable[[str], None],
         id: str = "",
         identity: Identity | None = None,
+        may_drive: Callable[[str], bool] | None = None,
     ) -> DriveConnection:
         """Register a page's socket; see ``GateClient.connect``."""
         if role not in get_args(Role):
@@ -346,7 +407,7 @@ class Pages:
             hello = protocol.Connect(
                 f"{self._prefix}{own}", name, role, identity=identity
             )
-            connection = DriveConnection(self, hello, send, close)
+            connection = DriveConnection(self, hello, send, close, may_drive)
             self._connections[connection.id] = connection
             self.send(hello)
             if self._agent:  # the page is greeted by the display's own gate
@@ -406,21 +467,15 @@ class Pages:
     def on_report(self, report: protocol.RobotReport) -> None:
         """Send a robot's report to all pages."""
         holder = None if report.holder is None else report.holder.connection
-        texts: dict[tuple[bool, Cap], str] = {}
+        texts: dict[tuple[bool, bool, Cap], str] = {}
         with self._lock:
             self._latest[report.robot] = report
             for connection in self._all():
                 mine, page = connection.id == holder, connection.cap
-                if (mine, page) not in texts:  # most pages receive the same text
-                    text = robot_text(
-                        report,
-                        mine=mine,
-                        page=page,
-                        agent=self._agent,
-                        prefix=self._prefix,
-                    )
-                    texts[mine, page] = text
-                connection.send_text(texts[mine, page])
+                key = mine, connection.looks_at(report.robot), page
+                if key not in texts:  # most pages receive the same text
+                    texts[key] = self._text(report, *key)
+                connection.send_text(texts[key])
 
     def on_robot_gone(self, gone: protocol.RobotGone) -> None:
         """Report to all pages that a robot was removed."""
@@ -471,14 +526,18 @@ class Pages:
         if not connection.greeted:
             return
         holder = None if report.holder is None else report.holder.connection
-        text = robot_text(
+        looks, mine = connection.looks_at(report.robot), holder == connection.id
+        connection.send_text(self._text(report, mine, looks, connection.cap))
+
+    def _text(self, report: RobotReport, mine: bool, looks: bool, page: Cap) -> str:
+        return robot_text(
             report,
-            mine=holder == connection.id,
-            page=connection.cap,
+            mine=mine,
+            page=page,
+            looks=looks,
             agent=self._agent,
             prefix=self._prefix,
         )
-        connection.send_text(text)
 
     def show_again(self, connection: DriveConnection) -> None:
         """Send a page the newest report of every robot."""

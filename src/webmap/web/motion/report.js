@@ -49,6 +49,7 @@ import { SEEN } from "../constants.js";
  * @property {string[]} [hooks] The stop hooks that failed, and why.
  * @property {{every: number | null, by: string, at: number | null} | null} [check] The
  *     last check before driving.
+ * @property {boolean} [looks] Whether the person may not drive it, only look and stop it.
  */
 
 /**
@@ -189,7 +190,7 @@ export function stopOf(key) {
  * @returns {boolean} Whether a press may take the lease without a request to a person.
  */
 export function mayTake(report) {
-  if (isLatched(report)) return false;
+  if (isLatched(report) || report.looks) return false;
   return report.armable && (!heldByAnother(report) || heldByProgram(report));
 }
 
