@@ -9,7 +9,7 @@ from starlette.types import Scope
 
 from webmap.core.operators import Viewer
 from webmap.server.auth import Attempts, Codes, Token, new_token
-from webmap.server.origins import Hosts, same_origin
+from webmap.server.origins import LOOPBACK, Hosts, is_loopback, same_origin
 from webmap.server.people import Denied, People
 
 _SAFE_METHODS = {"GET", "HEAD", "OPTIONS"}
@@ -26,6 +26,9 @@ PROTOCOL = "webmap"
 let a page set no other header of a WebSocket."""
 
 _SECRET = {TOKEN, CODE}
+
+_FORWARDED = (b"forwarded", b"via", b"x-forwarded", b"x-real-ip")
+"""The beginnings of the headers that proxies add."""
 
 NOT_SIGNED_IN = (
     "This browser is not signed in, or WebMap was started again with a new token. Open "
@@ -93,6 +96,9 @@ class RequestHead:
 
     wants_html: bool
 
+    forwarded: bool = False
+    """Whether a proxy passed it on, as far as the proxy states that."""
+
     @classmethod
     def of(cls, scope: Scope) -> "RequestHead":
         """Return the request of an ``http`` or ``websocket`` scope."""
@@ -119,6 +125,7 @@ class RequestHead:
             )[:4],
             address=(scope.get("client") or ("",))[0],
             wants_html=any("text/html" in one for one in _headers(scope, b"accept")),
+            forwarded=any(name.startswith(_FORWARDED) for name, _ in scope["headers"]),
         )
 
     @property
@@ -242,6 +249,20 @@ class AccessControl:
                 "origin.",
             )
         return None
+
+    def is_local(self, request: RequestHead) -> bool:
+        """Return whether a program of this machine asks, and not a proxy.
+
+        A proxy may hide itself, but then it is configured here by its origin, or signs
+        people in.
+        """
+        return (
+            is_loopback(request.address)
+            and request.host.lower().removesuffix(f":{request.port}") in LOOPBACK
+            and not request.forwarded
+            and not self._settings.origins
+            and self._settings.authenticate is None
+        )
 
     def identify(
         self, request: RequestHead, now: float

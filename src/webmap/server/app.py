@@ -10,11 +10,14 @@ from pathlib import Path
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, RedirectResponse, Response
+from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import Receive, Scope, Send
 
+from webmap.base.errors import WebMapError
+from webmap.base.roles import Role, covers, who_may
 from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer
 from webmap.core.page import Site
 from webmap.server.access import Settings
 from webmap.server.files import (
@@ -28,11 +31,20 @@ from webmap.server.files import (
     is_worth_compressing,
     read_below,
 )
+from webmap.server.health import Health
 from webmap.server.html import FOLDER, base_of, make_page, prepare_page
 from webmap.server.open_pages import OpenPages
 from webmap.server.outbox import BatchedCallsByLoop
 from webmap.server.own_files import own_files
-from webmap.server.security import PAGE_KEY, SANDBOX, VIEWER, Security, plain
+from webmap.server.security import (
+    HEALTH,
+    METRICS,
+    PAGE_KEY,
+    SANDBOX,
+    VIEWER,
+    Security,
+    plain,
+)
 from webmap.server.sockets import ConnectToGate, DriveSockets, SceneSockets, find_page
 
 log = logging.getLogger("webmap.server")
@@ -41,6 +53,30 @@ _PEOPLE_S = 0.4
 """Seconds after which changes of users and sessions take effect."""
 
 Lifespan = Callable[[Starlette], AbstractAsyncContextManager[None]]
+
+
+class RouteFor(Route):
+    """A route with the least role of those who may use it.
+
+    Who has not signed in reaches only what :class:`Security` lets everybody see.
+    """
+
+    def __init__(
+        self,
+        least: Role,
+        path: str,
+        endpoint: Callable[..., object],
+        methods: list[str] | None = None,
+    ) -> None:
+        super().__init__(path, endpoint, methods=methods)
+        self.least = least
+
+    async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer those who may, and refuse all others."""
+        viewer: Viewer | None = scope.get(VIEWER)
+        if viewer is not None and not covers(viewer.role, self.least):
+            raise HTTPException(403, who_may(self.least))
+        await super().handle(scope, receive, send)
 
 
 class WebApp:
@@ -73,6 +109,8 @@ class WebApp:
         self.settings = settings = settings or Settings()
         self.published = published or Published()
         self._gzip = GzipCache()
+        self.health = Health()
+        """Whether this process works."""
         calls = BatchedCallsByLoop()
         self._sockets = (
             SceneSockets(site, pages, calls, settings.max_pages),
@@ -80,14 +118,17 @@ class WebApp:
         )
         scene, drive = self._sockets
         self.routes = [
+            # Open to every role: each message has a least role of its own.
             WebSocketRoute("/_webmap/scene", scene.serve),
             WebSocketRoute("/_webmap/drive", drive.serve),
-            Route("/_webmap/key", _key_fits, methods=["POST"]),
-            Route("/_webmap/sign-out", self._sign_out, methods=["POST"]),
-            Route(FILES + "{name:path}", self._published_file),
-            Route(IMAGES + "{tag}", self._published_image),
-            Route("/_webmap/{name:path}", self._static),
-            Route("/{path:path}", PageAnswers(site, self._gzip)),
+            RouteFor("viewer", "/_webmap/key", _key_fits, methods=["POST"]),
+            RouteFor("viewer", "/_webmap/sign-out", self._sign_out, methods=["POST"]),
+            RouteFor("viewer", FILES + "{name:path}", self._published_file),
+            RouteFor("viewer", IMAGES + "{tag}", self._published_image),
+            RouteFor("viewer", "/_webmap/{name:path}", self._static),
+            RouteFor("viewer", HEALTH, self._healthz),
+            RouteFor("admin", METRICS, self._metrics),
+            RouteFor("viewer", "/{path:path}", PageAnswers(site, self._gzip)),
         ]
         self._security = Security(
             Starlette(
@@ -132,6 +173,24 @@ class WebApp:
             await asyncio.to_thread(self.settings.people.end, viewer.id)
             self._end_sockets()
         return Response(status_code=204)
+
+    async def _healthz(self, request: Request) -> Response:
+        found = await self.health.look()
+        status = "not ok" if found.problems else "ok"
+        answer: dict[str, object] = {"status": status}
+        if VIEWER in request.scope:
+            answer |= {"problems": found.problems, "notes": found.notes}
+        return JSONResponse(answer, 503 if found.problems else 200)
+
+    async def _metrics(self, request: Request) -> Response:
+        try:
+            from webmap.server.metrics import rendered
+        except WebMapError as error:  # the extra is not installed
+            raise HTTPException(501, str(error)) from None
+        found, pages = await self.health.look(), self._sockets[0].open
+        accept = request.headers.get("accept", "")
+        text, media_type = rendered(found, len(pages), pages.viewers, accept)
+        return Response(text, headers={"content-type": media_type})
 
     async def _static(self, request: Request) -> Response:
         name = request.path_params["name"]

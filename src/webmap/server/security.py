@@ -54,12 +54,15 @@ SANDBOX = CONTENT_SECURITY_POLICY + "; sandbox"
 _STARTS = {"http.response.start", "websocket.http.response.start"}
 
 
-def with_headers(send: Send, cookie: str | None = None) -> Send:
+def with_headers(
+    send: Send, cookie: str | None = None, *, closes: bool = False
+) -> Send:
     """Return ``send`` with the headers added that an answer lacks.
 
     Args:
         send: Sends the answer.
         cookie: A whole Set-Cookie header, which is added too.
+        closes: Whether the connection ends after the answer.
 
     """
 
@@ -74,6 +77,8 @@ def with_headers(send: Send, cookie: str | None = None) -> Send:
             headers += [header for header in HEADERS if header[0] not in present]
             if b"cache-control" not in present:
                 headers.append((b"cache-control", b"no-store"))
+            if closes:
+                headers.append((b"connection", b"close"))
             if cookie is not None:
                 headers.append((b"set-cookie", cookie.encode("latin-1")))
             message = {**message, "headers": headers}
@@ -114,6 +119,10 @@ def redirect(to: Redirect) -> Response:
     response.headers["location"] = to.location
     return response
 
+
+HEALTH = "/healthz"
+METRICS = "/metrics"
+"""Paths with an answer for those who have not signed in."""
 
 VIEWER = "webmap.viewer"
 """The key of the scope with the viewer who makes a request."""
@@ -161,6 +170,8 @@ class Security:
                 await self._app(scope, receive, send)
         elif isinstance(who, Redirect):
             await redirect(who)(scope, receive, send)
+        elif self._is_shown_to_all(request):
+            await self._app(scope, receive, with_headers(send, closes=True))
         else:
             _log_refusal(who, request, scope)
             form = self._form(request, scope) if self._named else None
@@ -174,6 +185,16 @@ class Security:
     def new_code(self) -> str:
         """Return a one-time code that signs one browser in."""
         return self._access.codes.issue(self._now())
+
+    def _is_shown_to_all(self, request: RequestHead) -> bool:
+        """Return whether a request that is not signed in gets an answer all the same.
+
+        Everybody learns whether WebMap works, and programs of this machine its figures.
+        """
+        if not request.reads or self._access.check_address(request) is not None:
+            return False
+        path = request.path.removeprefix(request.root)
+        return path == HEALTH or (path == METRICS and self._access.is_local(request))
 
     async def _who(
         self, request: RequestHead, scope: Scope, receive: Receive
