@@ -91,3 +91,20 @@ def test_a_handler_gets_the_events_of_those_who_may(make_page, role, least):
     page.dispatch(1, button, Event(kind="click", viewer=page.viewer, page=page))
     assert len(calls) == covers(role, least or "operator")
     assert len(page.channel.errors) == 1 - len(calls)
+
+
+@pytest.mark.parametrize("each", CLASSES, ids=lambda each: each.__name__)
+def test_each_message_of_each_module_reaches_it_only_from_its_least_role(
+    make_page, each
+):
+    class Declared(Part):
+        MAY_SEND = each.MAY_SEND
+
+    for role in ROLES:
+        map = Map(make_page(Viewer("v1", "Vic", role)).element("webmap_container"))
+        part = Declared(map)
+        for op, least in [*each.MAY_SEND.items(), ("undeclared", "operator")]:
+            for message in ({"op": op}, {op: 1}):
+                part.messages.clear()
+                map.on_module_message(part.browser_part.instance, message)
+                assert part.messages == [message] * covers(role, least), (role, op)
