@@ -17,9 +17,15 @@ from safety_bytes import CORPUS
 import webmap
 from equipment.gate_harness import KEY, spec
 from webmap.base.errors import WebMapError
+from webmap.base.map_file import read_map
+from webmap.config.checks import Mistakes
+from webmap.config.fleet import read_fleet
+from webmap.config.toml_text import read_text
+from webmap.features.labels.label_store import LabelStore
 from webmap.gate.actions import SendGoal
 from webmap.gate.protocol import FromGate
 from webmap.ros.decoding import decode_json
+from webmap.server.people import UserFile
 from webmap.sim.web_video import HttpError
 
 FILE = Path("picture")
@@ -211,3 +217,47 @@ def test_no_pieces_break_a_parser_of_streams(name, pieces):
             getattr(parser, method)(piece)
     except WebMapError as error:
         assert len(str(error)) < 2000
+
+
+FILES = {
+    "fleet.toml": lambda file: read_fleet(read_text(file).data, Mistakes()),
+    "users.toml": lambda file: UserFile(file.parent).read(),
+    "map.yaml": read_map,
+    "image.pgm": lambda file: read_map(_map_of(file)),
+    "labels/of.json": lambda file: LabelStore(file.parents[1], "of").load(),
+}
+"""The files that WebMap reads, and what reads them."""
+
+TEXTS = [
+    b'[bridges]\na = "ws://robot:9090"\n[[robots]]\nname = "Bob"\nbridge = "a"\n',
+    b'[users.ana]\nrole = "operator"\npassword = "$argon2id$x"\n',
+    b"image: image.pgm\nresolution: 0.05\norigin: [0, 0, 0]\nnegate: 0\n"
+    b"occupied_thresh: 0.65\nfree_thresh: 0.2\n",
+    b'[{"name": "Dock", "x": 1.0, "y": 2.0, "icon": "charger"}]',
+    b"P5\n2 2\n255\n\0\1\2\3",
+    b"a: &a [x, x]\nb: &b [*a, *a]\nc: [*b, *b]\n",
+    b"a = " + b"[" * 500,
+]
+
+
+def _map_of(image):
+    file = image.with_name("of.yaml")
+    file.write_bytes(TEXTS[2])
+    return file
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_no_file_breaks_its_reader(name, tmp_path):
+    file = tmp_path / name
+    file.parent.mkdir(exist_ok=True)
+
+    @settings(max_examples=40)
+    @given(data=st.sampled_from(TEXTS) | nearly_valid())
+    def read(data):
+        file.write_bytes(data)
+        try:
+            FILES[name](file)
+        except WebMapError as error:
+            assert len(str(error)) < 20_000
+
+    read()
