@@ -58,13 +58,12 @@ def graph() -> dict[str, set[str]]:
 def licences(package: Distribution) -> list[dict[str, Any]]:
     """Return the licence of a package, as its metadata states it."""
     about = package.metadata
-    if expression := about.get("License-Expression"):
+    for expression in about.get_all("License-Expression") or []:
         return [{"expression": expression}]
     classifiers = about.get_all("Classifier") or []
     names = [one.rpartition(" :: ")[2] for one in classifiers if "License ::" in one]
-    text = about.get("License") or ""
-    named = names or ([text] if text and "\n" not in text else [])
-    return [{"license": {"name": name}} for name in named]
+    texts = [one for one in about.get_all("License") or [] if "\n" not in one]
+    return [{"license": {"name": name}} for name in names or texts]
 
 
 def sbom() -> dict[str, Any]:
@@ -121,7 +120,9 @@ def pins() -> str:
         if name != "webmap":
             hashes = each["download_info"]["archive_info"]["hashes"]
             version = each["metadata"]["version"]
-            lines.append(f"{name}=={version} \\\n    --hash=sha256:{hashes['sha256']}\n")
+            lines.append(
+                f"{name}=={version} \\\n    --hash=sha256:{hashes['sha256']}\n"
+            )
     return HEAD + "".join(sorted(lines))
 
 

@@ -18,6 +18,7 @@ from webmap.modules.declaration import declarations
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
+
 def texts_of(type, path=()):
     """Yield the path of each text of a message, by its type; no words of a list."""
     if isinstance(type, msgspec.structs.StructMeta):
@@ -111,7 +112,9 @@ def test_a_script_in_any_text_of_any_message_of_a_robot_does_not_run(tab, dialec
         assert [one.name for one in drawn if types.isdisjoint(one.types)] == []
         with webmap("view", bridge.url, "--port", "0", "--no-browser") as url:
             tab.goto(url)
-            tab.locator("#robots .row button", has_text="anna").first.dispatch_event("click")
+            tab.locator("#robots .row button", has_text="anna").first.dispatch_event(
+                "click"
+            )
             tab.locator("summary[title=Log]").dispatch_event("click")
             look(tab, missing)
         assert {name for _, name in bridge.texts} >= {*IN_LISTS}

@@ -47,7 +47,7 @@ AFTER = {
 
 
 def prepared(kind, role):
-    """Return a gate where the command of a page ``c`` with enough rights is accepted."""
+    """Return a gate that accepts the command of a page ``c`` with enough rights."""
     bench = Bench().begin(spec(pose_topic="/initialpose"))
     bench.join("c", role)
     if kind is commands.Reset:

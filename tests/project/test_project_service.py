@@ -90,7 +90,10 @@ def test_a_service_writes_only_into_the_folder_that_its_unit_gives_it(unit, tmp_
     _, service = unit
     assert service["ProtectSystem"] == "strict"
     assert "ReadWritePaths" not in service
-    assert service["Environment"] == f"WEBMAP_STATE_DIR=/var/lib/{service['StateDirectory']}"
+    assert (
+        service["Environment"]
+        == f"WEBMAP_STATE_DIR=/var/lib/{service['StateDirectory']}"
+    )
     hooks, home, log = tmp_path / "hooks", tmp_path / "home", tmp_path / "log"
     for folder in (hooks, home):
         folder.mkdir()

@@ -1,8 +1,9 @@
-"""The pinned versions and the bill of materials have every package that WebMap needs."""
+"""Pinned versions and the bill of materials have every package that WebMap needs."""
 
 import json
 import re
 import tomllib
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,8 @@ ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 PIN = re.compile(r"([a-z0-9-]+)==([^ ]+) \\\n    --hash=sha256:([0-9a-f]{64})\n")
 
+URN = re.compile(r"urn:uuid:[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}")
+
 
 @pytest.fixture(scope="module")
 def sbom():
@@ -24,7 +27,7 @@ def sbom():
 def declared():
     """Return all requirements of WebMap and its extras."""
     extras = PROJECT["optional-dependencies"].values()
-    return [Requirement(r) for r in (*PROJECT["dependencies"], *sum(extras, []))]
+    return [*map(Requirement, chain(PROJECT["dependencies"], *extras))]
 
 
 def test_each_package_of_the_image_is_pinned_with_its_hash():
@@ -40,7 +43,7 @@ def test_each_package_of_the_image_is_pinned_with_its_hash():
 
 def test_the_bill_of_materials_has_each_package_with_version_and_licence(sbom):
     assert (sbom["bomFormat"], sbom["specVersion"]) == ("CycloneDX", "1.6")
-    assert re.fullmatch(r"urn:uuid:[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}", sbom["serialNumber"])  # fmt: skip
+    assert URN.fullmatch(sbom["serialNumber"])
     main, parts = sbom["metadata"]["component"], sbom["components"]
     assert (main["name"], main["version"]) == ("webmap", PROJECT["version"])
     assert main["licenses"] == [{"expression": PROJECT["license"]}]

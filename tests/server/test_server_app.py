@@ -5,7 +5,7 @@ import zlib
 
 import pytest
 from starlette.applications import Starlette
-from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.routing import Mount, WebSocketRoute
 from starlette.websockets import WebSocketDisconnect
 
 from equipment.server_fakes import TOKEN, FakePage, key_in

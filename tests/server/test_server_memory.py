@@ -1,4 +1,4 @@
-"""Bombs and floods before and after the sign-in: the memory of the display has a limit."""
+"""Bombs and floods before and after the sign-in fill no memory of the display."""
 
 import contextlib
 import gzip

@@ -161,4 +161,3 @@ def _of_disk() -> list[str]:
         f"The disk of the folder for state is full ({free >> 20} MiB are free): a "
         "restart may forget a STOP."
     ]
-

@@ -1,7 +1,7 @@
 """The figures of this process in the format of Prometheus."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from webmap.base.counts import counts
 from webmap.base.errors import WebMapError
@@ -118,9 +118,9 @@ def _of_model(figures: Figures) -> Iterator[Metric]:
 
 
 def _gauge(
-    name: str, text: str, values: float | list[tuple[str, float]], label: str = ""
+    name: str, text: str, values: float | Sequence[tuple[str, float]], label: str = ""
 ) -> Metric:
     family = GaugeMetricFamily(f"webmap_{name}", text, labels=[label] if label else [])
-    for of, value in values if isinstance(values, list) else [("", values)]:
+    for of, value in [("", values)] if isinstance(values, int | float) else values:
         family.add_metric([of] if label else [], value)
     return family
