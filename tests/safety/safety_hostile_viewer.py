@@ -11,7 +11,7 @@ import os
 import sys
 import threading
 
-from safety_bytes import CORPUS
+from safety_corpus import CORPUS
 from safety_crowd import sign_in
 from websockets.asyncio.client import connect
 from websockets.exceptions import WebSocketException
