@@ -19,7 +19,9 @@ def rows(title):
 
 @pytest.mark.slow
 def test_every_test_named_on_the_page_on_security_exists():
-    trees = (ast.parse(path.read_text()) for path in (ROOT / "tests").rglob("test_*.py"))
+    trees = (
+        ast.parse(path.read_text()) for path in (ROOT / "tests").rglob("test_*.py")
+    )
     there = {getattr(node, "name", "") for tree in trees for node in ast.walk(tree)}
     named = set(re.findall(r"`(test_\w+)`", PAGE))
     assert len(named) > 60

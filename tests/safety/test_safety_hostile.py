@@ -76,7 +76,7 @@ def test_a_robot_drives_and_stops_while_three_peers_flood_the_display(bench, pee
 def test_a_robot_drives_and_stops_beside_a_hostile_robot_and_a_hostile_viewer(bench):
     with (
         beside(bench, "safety_hostile_peers:tiny_texts"),
-        helper("safety_hostile_viewer.py", bench.url) as viewer,
+        helper("safety_hostile_viewer.py", bench.url, prepare=None) as viewer,
     ):
         assert viewer.stdout.readline() == "ready\n"
         check(bench)
