@@ -10,6 +10,7 @@ from prometheus_client.parser import text_string_to_metric_families
 
 from equipment.server_fakes import TOKEN, wait_for
 from webmap import Bridge, Robot
+from webmap.base.counts import counts
 from webmap.base.errors import ConfigError
 from webmap.core.operators import Viewer
 from webmap.core.page import site
@@ -193,3 +194,16 @@ def test_without_the_extra_the_answer_names_its_installation(local, monkeypatch)
 def test_no_page_can_have_the_path_of_a_report(path):
     with pytest.raises(ConfigError, match="'/healthz' or '/metrics'"):
         site.page(path)
+
+
+def test_what_is_sent_to_pages_is_counted(client, rooms):
+    before, url = counts["sent_bytes"], "ws://127.0.0.1:8000/_webmap/scene?id=p&page=/"
+    headers = {"origin": "http://127.0.0.1:8000"}
+    key = client.headers["webmap-key"]
+    with client.websocket_connect(url, ["webmap", key], headers=headers) as socket:
+        rooms.model.scenes[0].socket.offer(b"abc")
+        assert socket.receive_bytes() == b"abc"
+        found = samples(client.get("/metrics").text)
+        assert found["webmap_pages",] == found["webmap_viewers",] == 1
+        assert found["webmap_sent_bytes_total",] == before + 3
+        socket.close()
