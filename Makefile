@@ -164,6 +164,14 @@ test-safety: $(DEV) $(NODE)
 	$(SAFETY) -n $(JOBS) tests/gate/test_gate_machine.py || failed=1; \
 	$(PY) tests/safety/safety_figures.py $(FIGURES); exit $$failed
 
+## sbom: what is installed here, with its licences, as CycloneDX in dist/webmap.cdx.json
+## pins: write the versions and hashes of all packages to requirements/image.txt
+.PHONY: sbom pins
+sbom: $(DEV)
+	$(PY) tools/supply_chain.py sbom dist/webmap.cdx.json
+pins: $(DEV)
+	$(PY) tools/supply_chain.py pins
+
 ## docs: the documentation, in docs/_build/html
 .PHONY: docs
 docs: $(DOCS)

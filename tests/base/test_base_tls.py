@@ -187,3 +187,12 @@ def test_without_the_package_cryptography_the_error_names_the_extra(
     monkeypatch.setitem(__import__("sys").modules, "webmap.base.authority", None)
     with pytest.raises(ConfigError, match=r"pip install 'webmap\[tls\]'"):
         own(tmp_path)
+
+
+def test_the_end_of_a_certificate_is_known(tmp_path):
+    renewal = Renewal(tls_files("127.0.0.1", tmp_path, True, "", ""))
+    data = renewal.files.certificate.read_bytes()
+    end = x509.load_pem_x509_certificate(data).not_valid_after_utc
+    assert renewal.ends() == end.timestamp()
+    renewal.files.certificate.unlink()
+    assert renewal.ends() == 0.0

@@ -91,9 +91,11 @@ class FixedBridge:
 
 
 @contextlib.contextmanager
-def fixed_bridge(dialect: str) -> Iterator[FixedBridge]:
+def fixed_bridge(
+    dialect: str, kind: type[FixedBridge] = FixedBridge
+) -> Iterator[FixedBridge]:
     """Run a :class:`FixedBridge` in a separate thread."""
-    bridge = FixedBridge(dialect)
+    bridge = kind(dialect)
     ready, stop = threading.Event(), threading.Event()
 
     async def run() -> None:

@@ -177,3 +177,20 @@ def test_looking_at_the_robot_of_another_person_is_allowed(make_page, robots):
     part = Part(Map(page.element("webmap_container")))
     part.map.on_module_message(part.browser_part.instance, {"look": other.id})
     assert part.messages == [{"look": other.id}]
+
+
+@pytest.mark.parametrize("each", CLASSES, ids=lambda each: each.__name__)
+def test_each_message_of_each_module_reaches_it_only_from_its_least_role(
+    make_page, each
+):
+    class Declared(Part):
+        MAY_SEND = each.MAY_SEND
+
+    for role in ROLES:
+        map = Map(make_page(Viewer("v1", "Vic", role)).element("webmap_container"))
+        part = Declared(map)
+        for op, least in [*each.MAY_SEND.items(), ("undeclared", "operator")]:
+            for message in ({"op": op}, {op: 1}):
+                part.messages.clear()
+                map.on_module_message(part.browser_part.instance, message)
+                assert part.messages == [message] * covers(role, least), (role, op)

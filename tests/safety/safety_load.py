@@ -40,13 +40,11 @@ def run_separately():
 
 
 @contextlib.contextmanager
-def helper(script, *arguments):
+def helper(script, *arguments, prepare=run_separately):
     """Run a script of this folder for as long as the ``with`` block lasts."""
     command = [sys.executable, str(Path(__file__).with_name(script)), *arguments]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
-    with subprocess.Popen(
-        command, text=True, preexec_fn=run_separately, **pipes
-    ) as process:
+    with subprocess.Popen(command, text=True, preexec_fn=prepare, **pipes) as process:
         try:
             yield process
             assert process.poll() is None, f"{script} has ended"

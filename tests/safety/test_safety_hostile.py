@@ -2,6 +2,7 @@
 
 import pytest
 from safety_hostile import beside, drive
+from safety_load import helper
 from safety_run import FULL, grace
 
 pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
@@ -69,4 +70,13 @@ FLOODS = [
 @pytest.mark.parametrize("peers", FLOODS, ids=" ".join)
 def test_a_robot_drives_and_stops_while_three_peers_flood_the_display(bench, peers):
     with beside(bench, *(f"safety_hostile_peers:{peer}" for peer in peers)):
+        check(bench)
+
+
+def test_a_robot_drives_and_stops_beside_a_hostile_robot_and_a_hostile_viewer(bench):
+    with (
+        beside(bench, "safety_hostile_peers:tiny_texts"),
+        helper("safety_hostile_viewer.py", bench.url, prepare=None) as viewer,
+    ):
+        assert viewer.stdout.readline() == "ready\n"
         check(bench)

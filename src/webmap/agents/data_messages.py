@@ -180,7 +180,7 @@ def lean_scan(frame: bytes | bytearray, beams: int | None) -> bytes | bytearray:
         elif not is_cbor:
             return frame
         return _packed(operation, scan) if is_cbor else msgspec.json.encode(operation)
-    except (ProtocolError, ValueError, KeyError, TypeError) as error:
+    except (ProtocolError, ValueError, LookupError, TypeError, RecursionError) as error:
         raise WireError(f"got a message that is no scan: {error!r}") from error
 
 

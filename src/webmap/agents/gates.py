@@ -22,7 +22,7 @@ from webmap.base.roles import Role
 from webmap.base.scope import Removal
 from webmap.gate import protocol
 from webmap.gate.commands import Stop, robot_in, stop_in
-from webmap.gate.display.client import DriveConnection, GateClient
+from webmap.gate.display.client import DriveConnection, GateClient, TickTimes
 from webmap.gate.protocol import FromGate, FromPage, FromProgram, Report, RobotSpec
 from webmap.ros.names import is_agent_url
 
@@ -172,6 +172,11 @@ class Gates:
     def pid(self) -> int | None:
         """The process id of the gate of this computer, if it runs."""
         return self.own.pid
+
+    @property
+    def ticks(self) -> TickTimes:
+        """When the ticks of the gate of this computer came."""
+        return self.own.ticks
 
     @property
     def ready(self) -> bool:

@@ -39,6 +39,11 @@ class Lifecycle:
         """Whether the model's event loop runs now."""
         return self.loop is not None
 
+    @property
+    def services(self) -> list[Any]:
+        """The services, in any order."""
+        return list(self._services)
+
     def add(self, service: LifecycleService) -> None:
         """Start ``service`` with the process, or now if that has started."""
         self._services.add(service)

@@ -1,5 +1,6 @@
 """TLS of this process's servers: the files, the names, and the renewal."""
 
+import _ssl
 import contextlib
 import socket
 import ssl
@@ -177,6 +178,15 @@ class Renewal:
         self.context = server_context(self.files)
         """What a server uses; connections that are open keep their certificate."""
         self._stamp = _stamp(self.files)
+
+    def ends(self) -> float:
+        """Return when the certificate expires, in Unix seconds; 0 if unknown."""
+        # The ssl module has no public function for a certificate of its own side.
+        try:
+            found = _ssl._test_decode_cert(str(self.files.certificate))  # type: ignore[attr-defined]
+        except OSError:
+            return 0.0
+        return ssl.cert_time_to_seconds(found["notAfter"])
 
     def look(self) -> bool:
         """Load the files again if they have changed, and return whether they have.

@@ -69,10 +69,11 @@ class Site:
             ConfigError: If the path is not valid, or the HTML file does not exist.
 
         """
-        if not re.fullmatch(r"/[A-Za-z0-9._~/-]*", path) or path.startswith("/_webmap"):
+        taken = path.startswith("/_webmap") or path in {"/healthz", "/metrics"}
+        if not re.fullmatch(r"/[A-Za-z0-9._~/-]*", path) or taken:
             raise ConfigError(
                 f"a page's path is '/' and letters, digits, '.', '_', '~', '-' or '/', "
-                f"and not below '/_webmap': got {path!r}"
+                f"neither below '/_webmap' nor '/healthz' or '/metrics': got {path!r}"
             )
 
         def register(function: PageFunction) -> PageFunction:

@@ -9,7 +9,7 @@ from starlette.types import Scope
 
 from webmap.core.operators import Viewer
 from webmap.server.auth import Attempts, Codes, Token, new_token
-from webmap.server.origins import Hosts, same_origin
+from webmap.server.origins import LOOPBACK, Hosts, is_loopback, same_origin
 from webmap.server.people import Denied, People
 from webmap.server.proxy import Proxies, ProxyUsers
 
@@ -32,6 +32,9 @@ FRAME = "frame"
 _FRAMES = {"iframe", "frame", "embed", "object"}
 
 _SECRET = {TOKEN, CODE}
+
+_FORWARDED = (b"forwarded", b"via", b"x-forwarded", b"x-real-ip")
+"""The beginnings of the headers that proxies add."""
 
 NOT_SIGNED_IN = (
     "This browser is not signed in, or WebMap was started again with a new token. Open "
@@ -125,6 +128,8 @@ class RequestHead:
 
     framed: bool
     """Whether it is for a page in a frame, or of one."""
+    forwarded: bool = False
+    """Whether a proxy passed it on, as far as the proxy states that."""
 
     @classmethod
     def of(cls, scope: Scope) -> "RequestHead":
@@ -152,6 +157,7 @@ class RequestHead:
             # A browser states where it shows a page; the page states it for sockets.
             framed=FRAME in dict(fields)
             or not _FRAMES.isdisjoint(_headers(scope, b"sec-fetch-dest")),
+            forwarded=any(name.startswith(_FORWARDED) for name, _ in scope["headers"]),
         )
 
     @property
@@ -275,6 +281,20 @@ class AccessControl:
                 "origin.",
             )
         return None
+
+    def is_local(self, request: RequestHead) -> bool:
+        """Return whether a program of this machine asks, and not a proxy.
+
+        A proxy may hide itself, but then it is configured here by its origin, or signs
+        people in.
+        """
+        return (
+            is_loopback(request.address)
+            and request.host.lower().removesuffix(f":{request.port}") in LOOPBACK
+            and not request.forwarded
+            and not self._settings.origins
+            and self._settings.authenticate is None
+        )
 
     def identify(
         self, request: RequestHead, now: float

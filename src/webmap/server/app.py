@@ -13,6 +13,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import (
     HTMLResponse,
+    JSONResponse,
     PlainTextResponse,
     RedirectResponse,
     Response,
@@ -20,7 +21,10 @@ from starlette.responses import (
 from starlette.routing import Route, WebSocketRoute
 from starlette.types import Receive, Scope, Send
 
+from webmap.base.errors import WebMapError
+from webmap.base.roles import Role, covers, who_may
 from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer
 from webmap.core.page import Site
 from webmap.core.shift_choice import Choice, csv_of
 from webmap.core.shift_log import shift_log
@@ -36,12 +40,15 @@ from webmap.server.files import (
     is_worth_compressing,
     read_below,
 )
+from webmap.server.health import Health
 from webmap.server.html import base_from, make_page, prepare_page, relative
 from webmap.server.open_pages import OpenPages
 from webmap.server.outbox import BatchedCallsByLoop
 from webmap.server.own_files import own_files
 from webmap.server.security import (
+    HEALTH,
     MARKS,
+    METRICS,
     PAGE_KEY,
     SANDBOX,
     VIEWER,
@@ -56,6 +63,30 @@ _PEOPLE_S = 0.4
 """Seconds after which changes of users and sessions take effect."""
 
 Lifespan = Callable[[Starlette], AbstractAsyncContextManager[None]]
+
+
+class RouteFor(Route):
+    """A route with the least role of those who may use it.
+
+    Who has not signed in reaches only what :class:`Security` lets everybody see.
+    """
+
+    def __init__(
+        self,
+        least: Role,
+        path: str,
+        endpoint: Callable[..., object],
+        methods: list[str] | None = None,
+    ) -> None:
+        super().__init__(path, endpoint, methods=methods)
+        self.least = least
+
+    async def handle(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer those who may, and refuse all others."""
+        viewer: Viewer | None = scope.get(VIEWER)
+        if viewer is not None and not covers(viewer.role, self.least):
+            raise HTTPException(403, who_may(self.least))
+        await super().handle(scope, receive, send)
 
 
 class WebApp:
@@ -89,6 +120,8 @@ class WebApp:
         shift_log.hide(settings.token)
         self.published = published or Published()
         self._gzip = GzipCache()
+        self.health = Health()
+        """Whether this process works."""
         calls = BatchedCallsByLoop()
         self._sockets = (
             SceneSockets(site, pages, calls, settings.max_pages),
@@ -96,15 +129,18 @@ class WebApp:
         )
         scene, drive = self._sockets
         self.routes = [
+            # Open to every role: each message has a least role of its own.
             WebSocketRoute("/_webmap/scene", scene.serve),
             WebSocketRoute("/_webmap/drive", drive.serve),
-            Route("/_webmap/key", _key_fits, methods=["POST"]),
-            Route("/_webmap/sign-out", self._sign_out, methods=["POST"]),
-            Route("/_webmap/shift-log.csv", _shift_log, methods=["POST"]),
-            Route(FILES + "{name:path}", self._published_file),
-            Route(IMAGES + "{tag}", self._published_image),
-            Route("/_webmap/{name:path}", self._static),
-            Route("/{path:path}", PageAnswers(site, self._gzip)),
+            RouteFor("viewer", "/_webmap/key", _key_fits, methods=["POST"]),
+            RouteFor("viewer", "/_webmap/sign-out", self._sign_out, methods=["POST"]),
+            RouteFor("viewer", "/_webmap/shift-log.csv", _shift_log, methods=["POST"]),
+            RouteFor("viewer", FILES + "{name:path}", self._published_file),
+            RouteFor("viewer", IMAGES + "{tag}", self._published_image),
+            RouteFor("viewer", "/_webmap/{name:path}", self._static),
+            RouteFor("viewer", HEALTH, self._healthz),
+            RouteFor("admin", METRICS, self._metrics),
+            RouteFor("viewer", "/{path:path}", PageAnswers(site, self._gzip)),
         ]
         self._security = Security(
             Starlette(
@@ -154,6 +190,24 @@ class WebApp:
         if at_proxy is None:
             return Response(status_code=204)
         return PlainTextResponse(at_proxy.sign_out_url)
+
+    async def _healthz(self, request: Request) -> Response:
+        found = await self.health.look()
+        status = "not ok" if found.problems else "ok"
+        answer: dict[str, object] = {"status": status}
+        if VIEWER in request.scope:
+            answer |= {"problems": found.problems, "notes": found.notes}
+        return JSONResponse(answer, 503 if found.problems else 200)
+
+    async def _metrics(self, request: Request) -> Response:
+        try:
+            from webmap.server.metrics import rendered
+        except WebMapError as error:  # the extra is not installed
+            raise HTTPException(501, str(error)) from None
+        found, pages = await self.health.look(), self._sockets[0].open
+        accept = request.headers.get("accept", "")
+        text, media_type = rendered(found, len(pages), pages.viewers, accept)
+        return Response(text, headers={"content-type": media_type})
 
     async def _static(self, request: Request) -> Response:
         name = request.path_params["name"]

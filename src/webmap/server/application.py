@@ -262,6 +262,7 @@ def _serve(
     if token is not None:
         settings["token"] = token
     app = _make_app(Settings(**settings), with_lifespan=False)
+    app.health.certificate = certificate
     listener = listen(host, port)
     browser = ExitStack()
 

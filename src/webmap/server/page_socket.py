@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from webmap.base.counts import counts
 from webmap.server.access import FRAME, PROTOCOL
 from webmap.server.outbox import BatchedCalls, DriveQueue, FrameQueue
 
@@ -314,9 +315,11 @@ class PageSocket:
                 stalled.cancel()
 
     def _stalled(self) -> None:
+        counts["stalled_pages"] += 1
         self._end(COME_BACK, f"this page read no message for {STALLED_S:.0f} s")
 
     async def _send(self, item: bytes | str) -> None:
+        counts["sent_bytes"] += len(item)
         if isinstance(item, str):
             await self._socket.send_text(item)
         else:
@@ -365,6 +368,11 @@ class OpenSockets:
 
     def __len__(self) -> int:
         return len(self._sockets)
+
+    @property
+    def viewers(self) -> int:
+        """The number of people with a socket."""
+        return len({viewer for viewer, _ in self._sockets})
 
     @property
     def full(self) -> bool:

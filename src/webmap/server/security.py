@@ -59,7 +59,11 @@ _STARTS = {"http.response.start", "websocket.http.response.start"}
 
 
 def with_headers(
-    send: Send, cookie: str | None = None, embed_from: Iterable[str] = ()
+    send: Send,
+    cookie: str | None = None,
+    embed_from: Iterable[str] = (),
+    *,
+    closes: bool = False,
 ) -> Send:
     """Return ``send`` with the headers added that an answer lacks.
 
@@ -67,6 +71,7 @@ def with_headers(
         send: Sends the answer.
         cookie: A whole Set-Cookie header, which is added too.
         embed_from: Origins whose pages may show the answer in a frame.
+        closes: Whether the connection ends after the answer.
 
     """
     ancestors = f"frame-ancestors {' '.join(embed_from)}".encode()
@@ -84,6 +89,8 @@ def with_headers(
                 headers = [(k, v.replace(_NO_FRAME, ancestors)) for k, v in headers]
             if b"cache-control" not in present:
                 headers.append((b"cache-control", b"no-store"))
+            if closes:
+                headers.append((b"connection", b"close"))
             if cookie is not None:
                 headers.append((b"set-cookie", cookie.encode("latin-1")))
             message = {**message, "headers": headers}
@@ -124,6 +131,10 @@ def redirect(request: RequestHead, to: Redirect) -> Response:
     response.headers["location"] = relative(request.path, to.location)
     return response
 
+
+HEALTH = "/healthz"
+METRICS = "/metrics"
+"""Paths with an answer for those who have not signed in."""
 
 VIEWER = "webmap.viewer"
 """The key of the scope with the viewer who makes a request."""
@@ -184,6 +195,8 @@ class Security:
                 await self._app(scope, receive, send)
         elif isinstance(who, Redirect):
             await redirect(request, who)(scope, receive, send)
+        elif self._is_shown_to_all(request):
+            await self._app(scope, receive, with_headers(send, closes=True))
         else:
             _log_refusal(who, request, scope)
             if request.tokens() or (self._named and _is_sign_in(request, scope)):
@@ -202,6 +215,16 @@ class Security:
     def new_code(self) -> str:
         """Return a one-time code that signs one browser in."""
         return self._access.codes.issue(self._now())
+
+    def _is_shown_to_all(self, request: RequestHead) -> bool:
+        """Return whether a request that is not signed in gets an answer all the same.
+
+        Everybody learns whether WebMap works, and programs of this machine its figures.
+        """
+        if not request.reads or self._access.check_address(request) is not None:
+            return False
+        path = request.path.removeprefix(request.root)
+        return path == HEALTH or (path == METRICS and self._access.is_local(request))
 
     async def _who(
         self, request: RequestHead, scope: Scope, receive: Receive

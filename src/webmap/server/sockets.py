@@ -89,6 +89,11 @@ class SceneSockets:
         self._open = OpenSockets(limit)
         self._opens = Opens(limit)
 
+    @property
+    def open(self) -> OpenSockets:
+        """The sockets of open pages."""
+        return self._open
+
     def end_unless(self, lasts: Callable[[str], object]) -> None:
         """Close the sockets of the viewers whose session has ended."""
         self._open.end_unless(lasts, SIGNED_OUT)

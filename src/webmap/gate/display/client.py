@@ -66,7 +66,40 @@ class PendingStops:
             }
 
 
-__all__ = ["DriveConnection", "GateClient"]
+class TickTimes:
+    """When the gate's ticks came; used in the client's thread, read in any."""
+
+    WINDOW = 15.0
+    """The longest time between two ticks is that of the last one or two windows."""
+
+    def __init__(self) -> None:
+        self._last: float | None = None
+        self._begun = 0.0
+        self._longest = (0.0, 0.0)
+
+    def note(self, now: float) -> None:
+        """Note a tick."""
+        before, latest = self._longest
+        if now - self._begun > self.WINDOW:
+            self._begun, before, latest = now, latest, 0.0
+        self._longest = (before, max(latest, self.age(now) or 0.0))
+        self._last = now
+
+    def end(self) -> None:
+        """Note that the gate has ended."""
+        self._last = None
+
+    def age(self, now: float) -> float | None:
+        """Return the seconds since the newest tick; None without a gate."""
+        last = self._last
+        return None if last is None else now - last
+
+    def gap(self, now: float) -> float:
+        """Return the longest time between two ticks lately, in seconds."""
+        return max(*self._longest, self.age(now) or 0.0)
+
+
+__all__ = ["DriveConnection", "GateClient", "TickTimes"]
 
 log = logging.getLogger("webmap.gate")
 
@@ -100,6 +133,8 @@ class GateClient:
             self.send, self._lock, connection=f"{prefix}{protocol.PROGRAM}"
         )
         self._pending_stops = PendingStops()
+        self.ticks = TickTimes()
+        """When the gate's ticks came."""
         self._numbers = itertools.count(1)
         self._specs: dict[str, RobotSpec] = {}
         self._listeners: dict[int, Callable[[Report], None]] = {}
@@ -321,6 +356,7 @@ class GateClient:
         """Pass a message of the gate to the pages, the program and the listeners."""
         match message:
             case protocol.Tick(tick):
+                self.ticks.note(time.monotonic())
                 self._program.on_tick(tick)
                 self._pages.on_tick(message)
                 with self._lock:
@@ -356,6 +392,7 @@ class GateClient:
 
     def gone(self, down: protocol.GateDown) -> None:
         """Note that the gate has ended, and every lease with it."""
+        self.ticks.end()
         self._pages.gone()
         self._program.gone(down.why)
         self._report(down)

@@ -237,7 +237,7 @@ def _read(data: bytes) -> _GoalFrame | None:
 def _as(value: Any, type: type[T]) -> T | None:
     try:
         return msgspec.convert(value, type)
-    except msgspec.ValidationError:
+    except ValueError:  # msgspec's own errors, and that of half a surrogate pair
         return None
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import msgspec
 
+from webmap.base.counts import counts
 from webmap.base.errors import WireError
 from webmap.scene.allowed import check_event
 from webmap.scene.element import Element, split_classes
@@ -359,6 +360,7 @@ class SceneSession:
             self._late = now
         self._waits = self._frame - self._seen >= self.WINDOW
         if self._waits:
+            counts["skipped_frames"] += 1
             return None
         self._dots.wait(now)
         period = now // AGES_EVERY
