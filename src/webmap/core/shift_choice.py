@@ -19,6 +19,8 @@ KINDS = {
     "pose": "Pose",
     "button": "Button",
     "alert": "Alert",
+    "check": "Check",
+    "recording": "Recording",
     "note": "Note",
     "shift": "Shift",
     "page": "Page",

@@ -7,6 +7,7 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 from webmap.base.tasks import spawn
+from webmap.core.shift_log import shift_log
 from webmap.features.check import check_store
 from webmap.features.check.check import Check, Facts, Line
 from webmap.scene import html
@@ -43,7 +44,6 @@ class CheckPanel:
     ) -> None:
         self.map = map
         self._entry = entry
-        self._may = map.page.viewer.role != "viewer"
         self._robot: Robot | None = None
         self._checks: dict[str, Check] = {}
         """The checks of this page that run or were just made, by robot."""
@@ -99,8 +99,9 @@ class CheckPanel:
         if check.look(facts_of(robot, report), time.monotonic()):
             self.browser_part.send({"op": "check", "robot": robot.id})
         if check.is_over and not over:
-            by = self.map.page.viewer.operator.logged
-            result = check_store.keep(robot, check, by)
+            person = self.map.page.viewer.operator
+            shift_log.note("check", status_of(check), robot=robot, person=person)
+            result = check_store.keep(robot, check, person.logged)
             spawn(asyncio.to_thread(check_store.write, robot, result))
 
     def _show(self, robot: "Robot", report: "RobotReport") -> None:
@@ -111,7 +112,8 @@ class CheckPanel:
         if place is not self._place:
             place.append(self.element)  # moves it
             self._place = place
-        self._button.set(disabled=bool(why), hidden=not self._may)
+        may = self.map.page.viewer.may_drive(robot.id)
+        self._button.set(disabled=bool(why), hidden=not may)
         self._button.set("title", why or None)
         if check is not None:
             status, found = status_of(check), check.lines
@@ -134,8 +136,8 @@ class CheckPanel:
         self, robot: "Robot", report: "RobotReport", check: Check | None
     ) -> str:
         """Return why a check cannot begin now, as a sentence; empty if it can."""
-        if not self._may:
-            return "Viewers cannot check robots: sign in as an operator."
+        if not self.map.page.viewer.may_drive(robot.id):
+            return "Only operators of this robot can check it."
         if check is not None and not check.is_over:
             return "A check is going on."
         holder, you = report.holder, self.map.page.viewer.operator.person

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from webmap.base.lifecycle import lifecycle
+from webmap.core.shift_log import shift_log
 from webmap.features.incidents.observer import RobotObserver
 from webmap.features.incidents.writer import IncidentWriter, Kept
 from webmap.scene import html
@@ -182,8 +183,9 @@ class Incidents:
         keeping.take(now)
         if self._writer is not None:
             self._writer.keep(asked)
-        # The place where the shift log notes a kept recording.
-        log.info("the last minutes are kept: %s", ", ".join(reasons[:MOST_REASONS]))
+        why = ", ".join(reasons[:MOST_REASONS])
+        log.info("the last minutes are kept: %s", why)
+        shift_log.note("recording", f"The last minutes are kept: {why}")
 
     async def _look_on(self) -> None:
         while True:
