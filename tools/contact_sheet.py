@@ -1,10 +1,11 @@
 """Take screenshots of every state of the console, and put them on contact sheets.
 
-Usage: tools/contact_sheet.py [FOLDER] [SIZE ...]
+Usage: tools/contact_sheet.py [FOLDER] [SIZE ...] [light] [dark] [forced]
 
 Each sheet has the states of one size of the window in one theme, as PNG files in the
 folder, ``test-results/screenshots`` by default. Needs Chromium. The sizes are the keys
-of ``SIZES``; without any, the sheets of all sizes are made.
+of ``SIZES``; without any, the sheets of all sizes are made. Without a theme, light and
+dark sheets are made; ``forced`` is light with forced colours.
 """
 
 import io
@@ -22,11 +23,14 @@ FOLDER = Path(__file__).parents[1] / "test-results" / "screenshots"
 SIZES = {
     "1024x600": (1024, 600),
     "1440x900": (1440, 900),
+    "1920x1080": (1920, 1080),
     "3840x2160": (3840, 2160),
     "phone": (390, 844),
     "phone-landscape": (844, 390),
     "tablet": (820, 1180),
 }
+
+THEMES = ("light", "dark", "forced")
 
 TOUCH = {"phone", "phone-landscape", "tablet"}
 
@@ -82,6 +86,11 @@ def reset(page: Page) -> None:
     button.dispatch_event("click")
 
 
+def mark_all(page: Page) -> None:
+    """Select the other robots too."""
+    page.evaluate("document.querySelectorAll('.besides').forEach((e) => e.click())")
+
+
 def turn_sheet(page: Page) -> None:
     """Open or close the sheet with the list and the card, if it is visible."""
     sheet = page.locator("#sheet")
@@ -108,6 +117,7 @@ STATES: tuple[tuple[str, tuple[Callable[[Page], None], ...]], ...] = (
     ("help", (press("Escape", "?"),)),
     ("camera", (press("Escape"), click(".camera-small"))),
     ("measuring", (press("m"),)),
+    ("several robots", (press("m"), click(".camera-close"), mark_all)),
 )
 """The name of each state, and the steps from the state before."""
 
@@ -117,6 +127,7 @@ def pictures(browser: Browser, url: str, size: str, scheme: str) -> list[Image.I
     width, height = SIZES[size]
     context = browser.new_context(
         color_scheme="dark" if scheme == "dark" else "light",
+        forced_colors="active" if scheme == "forced" else "none",
         viewport={"width": width, "height": height},
         has_touch=size in TOUCH,
     )
@@ -165,7 +176,8 @@ def joined(images: list[Image.Image]) -> Image.Image:
 def main(arguments: list[str]) -> None:
     """Make the contact sheets."""
     sizes = [name for name in arguments if name in SIZES] or list(SIZES)
-    others = [name for name in arguments if name not in SIZES]
+    schemes = [name for name in THEMES if name in arguments] or THEMES[:2]
+    others = [name for name in arguments if name not in (*SIZES, *THEMES)]
     folder = Path(others[0]) if others else FOLDER
     folder.mkdir(parents=True, exist_ok=True)
     with sync_playwright() as playwright, running("demo", "--no-browser") as url:
@@ -173,7 +185,7 @@ def main(arguments: list[str]) -> None:
             executable_path=shutil.which("chromium"), args=ARGS
         )
         for size in sizes:
-            for scheme in ("light", "dark"):
+            for scheme in schemes:
                 file = folder / f"{size}-{scheme}.png"
                 joined(pictures(browser, url, size, scheme)).save(file)
                 print(file)

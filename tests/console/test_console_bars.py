@@ -14,6 +14,7 @@ from playwright.sync_api import Browser, Page, expect
 
 from equipment.chromium import hold, watched_tab
 from equipment.webmap_process import page_of, simulator
+from webmap.console.bar import summary
 
 pytestmark = [pytest.mark.browser, pytest.mark.serial]
 
@@ -28,6 +29,7 @@ SIZES = [
     (768, 1024),
     (512, 300),
     (844, 390),
+    (932, 430),
     (897, 600),
     (1024, 600),
     (1280, 800),
@@ -100,10 +102,13 @@ WALK = """async ({ states, at }) => {
     }
     return found;
   };
-  const bars = [".bar", ".drive-bar"].map((name) => document.querySelector(name));
+  const bars = [...document.querySelectorAll(".bar, .drive-bar, .webmap-several")]
+    .filter(shown);
   const row = document.querySelector("#robots > .row").cloneNode(true);
   delete row.dataset.robot;
   document.querySelector("#robots").append(row);
+  const bridges = document.querySelector("#bridges .text");
+  const parts = [...bridges.childNodes];
   const wrong = [];
   const heights = {};
   for (const [name, state] of Object.entries(states)) {
@@ -119,6 +124,8 @@ WALK = """async ({ states, at }) => {
     replaced("requests", () => (state.asked ? [asked] : []));
     document.querySelector("#link").dataset.link = drive.state;
     drive._receive({ op: "robot", ...report, ...state.report });
+    bridges.replaceChildren(...(state.bridges ? [state.bridges] : parts));
+    row.querySelector(".state").textContent = state.words.join(" \u00b7 ");
     const where = `${name} at ${at}`;
     const texts = bars.flatMap(textsIn);
     for (const node of texts) {
@@ -138,8 +145,8 @@ WALK = """async ({ states, at }) => {
       }
     }
     // The most important first: nothing is left out before what follows it.
-    const parts = [...document.querySelector(".webmap-teleop-words").children];
-    const there = parts.filter(shown);
+    const there = [...document.querySelector(".webmap-teleop-words").children]
+      .filter(shown);
     const out = there.map((part) => sight(part.getBoundingClientRect(), part) === 0);
     const first = out.indexOf(true);
     if (first >= 0 && out.lastIndexOf(false) > first) {
@@ -151,7 +158,6 @@ WALK = """async ({ states, at }) => {
         wrong.push(`${where}: ${bar.className} is too wide`);
       }
     }
-    row.querySelector(".state").textContent = state.words.join(" \u00b7 ");
     for (const bar of [...bars, row]) {
       const { height } = bar.getBoundingClientRect();
       const before = (heights[bar.className] ??= height);
@@ -160,6 +166,7 @@ WALK = """async ({ states, at }) => {
     }
   }
   row.remove();
+  bridges.replaceChildren(...parts);
   delete drive.status;
   delete drive.state;
   delete drive.requests;
@@ -278,7 +285,20 @@ STATES = {
         link="lost",
         bar=["No connection"],
     ),
+    "no bridge": state(
+        "You have control",
+        *LIMITED,
+        bar=["Connected", "0 of 3 bridges"],
+        report={**MINE, "doing": "held"},
+        bridges=summary(["lost", "lost", "connecting"]),
+    ),
 }
+
+SEVERAL = {
+    name: {**STATES[name], "words": [*STATES[name]["words"], "3 robots", "STOP these"]}
+    for name in ("control", "late")
+}
+"""The states while several robots are selected, which another bar shows."""
 
 
 @pytest.fixture(scope="module")
@@ -310,11 +330,13 @@ OPEN = {
     "": "",
     "camera": "document.querySelector('.camera-small').click()",
     "panel": "document.querySelector('.webmap-layers').open = true",
+    "several": "document.querySelectorAll('.besides').forEach((box) => box.click())",
 }
 CLOSE = {
     "": "",
     "camera": "document.querySelector('.camera-close').click()",
     "panel": "document.querySelector('.webmap-layers').open = false",
+    "several": "document.querySelector('.webmap-several-clear').click()",
 }
 
 
@@ -324,11 +346,16 @@ CLOSE = {
 def test_no_bar_cuts_a_word_of_a_state_a_reason_or_the_link(page, sizes):
     wrong = []
     for part in OPEN:
+        several = part == "several"
         page.evaluate(OPEN[part])
+        if several:
+            expect(page.locator(".webmap-several")).to_contain_text("3 robots")
         for size in sizes:
             resize(page, size)
             at = f"{size[0]}x{size[1]} {part}".strip()
-            found = page.evaluate(WALK, {"states": STATES, "at": at})
+            found = page.evaluate(
+                WALK, {"states": SEVERAL if several else STATES, "at": at}
+            )
             wrong += found["wrong"]
         resize(page, (1440, 900))
         page.evaluate(CLOSE[part])

@@ -8,7 +8,7 @@ import pytest
 from console_ready import assert_free, expect_state, select, send_away, title, unfold
 from playwright.sync_api import expect
 
-from equipment.chromium import asleep, hold
+from equipment.chromium import asleep, end_stops, hold
 
 # On a busy machine, a delayed page or robot stops.
 pytestmark = [pytest.mark.browser, pytest.mark.slow, pytest.mark.serial]
@@ -31,6 +31,34 @@ def test_the_bar_the_card_and_the_list_show_the_same_state(open_console):
     expect_state(page, "Free")
 
 
+PLACES = """() => ["", " .state", " > .actions", " .cameras", " .more"].map((part) => {
+  const { y, height } = document.querySelector("#card" + part).getBoundingClientRect();
+  return [part, y, height];
+})"""
+"""The places and heights of the card and its parts."""
+
+
+def test_the_card_and_its_parts_stay_in_place_in_each_state(open_console):
+    page = open_console()
+    select(page, "Robot 1")
+    page.wait_for_function(
+        "() => document.querySelector('.cameras img').naturalWidth === 320"
+    )
+    expect(page.locator("#card .card-health")).to_contain_text("All OK")
+    expect_state(page, "Free")
+    places = page.evaluate(PLACES)
+    hold(page.keyboard, "a", lambda: title(page).text_content() == "You are driving")
+    assert page.evaluate(PLACES) == places
+    page.keyboard.press("Escape")
+    page.keyboard.up("a")
+    expect_state(page, "STOP active")
+    expect(page.locator("#card .reason")).to_have_text(
+        "STOP by you is active: reset it first."
+    )
+    assert page.evaluate(PLACES) == places
+    end_stops(page.locator(".webmap-stop-list .webmap-reset"))
+
+
 def test_the_card_runs_a_stop_test_of_a_robot_with_a_stated_command_timeout(
     open_console,
 ):
@@ -46,7 +74,7 @@ def test_the_card_runs_a_stop_test_of_a_robot_with_a_stated_command_timeout(
     page.get_by_role("button", name="Take control of Robot 2").click()
     expect(page.get_by_role("img", name="Camera of Robot 2")).to_be_visible()
     page.wait_for_function(
-        "document.querySelector('.cameras img').naturalWidth === 320"
+        "() => document.querySelector('.cameras img').naturalWidth === 320"
     )
     # The figures are below the camera; the card must be scrolled to see them.
     figures = page.locator("#card .speeds")

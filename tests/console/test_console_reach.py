@@ -69,6 +69,41 @@ def test_stop_can_be_pressed_and_works_with_any_panel_open(open_console, size):
     reset()
 
 
+ON_ITS_SIDE = """() => {
+  const box = (name) => document.querySelector(name).getBoundingClientRect();
+  const stop = document.querySelector(".webmap-stop-all");
+  const word = document.createRange();
+  word.selectNodeContents(stop);
+  const { left, right } = word.getBoundingClientRect();
+  const edges = stop.getBoundingClientRect();
+  const octagon = parseFloat(getComputedStyle(stop, "::before").width);
+  return {
+    "STOP is at the left": edges.left < 16 && edges.bottom > innerHeight - 16,
+    "STOP ALL has room": left - octagon - edges.left > 10 && edges.right - right > 5,
+    "the stick is at the right": box(".webmap-stick").right > innerWidth - 20,
+    "the map fills the screen": box("#map").width === innerWidth,
+    "the list is behind a button": !document.querySelector("#robots").checkVisibility(),
+  };
+}"""
+
+
+def test_a_phone_on_its_side_has_stop_left_the_stick_right_and_the_map_between(
+    open_console,
+):
+    page = open_console("on its side")
+    page.locator("#sheet").click()
+    page.locator("#robots .row", has_text="Robot 1").locator("button").first.click()
+    page.locator("#sheet").click()
+    for width, height in [(844, 390), (915, 412), (932, 430), (956, 440)]:
+        page.set_viewport_size({"width": width, "height": height})
+        seen = page.evaluate(ON_ITS_SIDE)
+        assert all(seen.values()), ((width, height), seen)
+    # A small desktop window, and a tablet with an open keyboard.
+    for width, height in [(932, 600), (1180, 420)]:
+        page.set_viewport_size({"width": width, "height": height})
+        expect(page.locator("#robots")).to_be_visible()
+
+
 @pytest.mark.parametrize(
     ("size", "keyboard"), [("phone", 300), ("on its side", 160), ("small phone", 250)]
 )

@@ -220,7 +220,7 @@ class RobotCard:
             "title",
             "No data comes from this robot. The robot is shown again when data comes.",
         )
-        self.notes.append(self._reason, self._problems)
+        self.notes.append(self._problems)
         self.more.append(
             html.summary(text="More"),
             html.div(locate, stop_test(), class_="actions"),
@@ -231,7 +231,7 @@ class RobotCard:
         return [
             head,
             state,
-            self._goal.element,
+            html.div(self._reason, self._goal.element, class_="reason-and-goal"),
             actions,
             self._cameras.element,
             self.notes,

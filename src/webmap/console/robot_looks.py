@@ -291,7 +291,11 @@ class StateMark:
         """Show the symbol of the state; its words only if it needs a person."""
         robot, look = self.robot, look_of(self.robot)
         self._use.set(href=f"#{look.symbol}")
-        self._words.text = robot.state.text if needs_person(robot) else ""
+        state = robot.state
+        # Who has control is in the list: on the map it would cover other robots.
+        held = state.activity == "held" and state.conditions
+        words = state.conditions_text if held else state.text
+        self._words.text = words if needs_person(robot) else ""
         robot.svg.set("data-tone", look.tone or None)
         robot.svg.set("data-group", look.group)
         title = robot.svg.children[0]

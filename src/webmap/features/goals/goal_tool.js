@@ -337,7 +337,8 @@ class GoalTool {
     const words = robots.length > 1 ? `Send goal to ${robots.length} robots` : "Send goal";
     setText(/** @type {Element} */ (this._go.lastElementChild), words);
     setAttribute(this._go, "aria-pressed", String(this._aim.active));
-    for (const one of [this._apart, this._formation]) setHidden(one, robots.length < 2);
+    const single = robots.length < 2 || !this._aim.active;
+    for (const one of [this._apart, this._formation]) setHidden(one, single);
     setHidden(this._cancel, !robots.some((robot) => this._mayCancel(robot)));
     this._draw(robots);
   }
