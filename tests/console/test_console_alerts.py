@@ -2,6 +2,7 @@
 
 import re
 import signal
+import time
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -84,6 +85,48 @@ def test_the_sound_waits_for_a_press_and_the_choice_is_kept(open_console):
     opened(page)
     expect(page.get_by_label("Sound")).not_to_be_checked()
     expect(page.locator(".webmap-alert-signals p").first).to_be_hidden()
+
+
+WATCH_SOUND = """
+globalThis.sounds = [];
+globalThis.tones = 0;
+globalThis.AudioContext = class extends AudioContext {
+  constructor() {
+    super();
+    sounds.push(this);
+  }
+  createOscillator() {
+    const tone = super.createOscillator();
+    tone.addEventListener("ended", () => { tones += 1; });
+    return tone;
+  }
+};
+"""
+
+SIGNAL = """async () => {
+  const { Signals } = await import("/_webmap/features/alerts/alert_signal.js");
+  new Signals().give("An alert", "");
+}"""
+
+RESTS = "sounds.every(({ state }) => state === 'suspended')"
+
+
+def until(page: Page, condition: str) -> None:
+    """Wait for a condition of a script."""
+    deadline = time.monotonic() + SOON / 1000
+    while not page.evaluate(condition):
+        assert time.monotonic() < deadline, page.evaluate("[tones, sounds.map(String)]")
+        page.wait_for_timeout(50)
+
+
+def test_the_browser_plays_no_silence_between_two_signals(open_console):
+    page = open_console()
+    page.add_init_script(WATCH_SOUND)
+    page.reload()
+    opened(page)
+    assert page.evaluate(RESTS)
+    page.evaluate(SIGNAL)
+    until(page, f"tones === 2 && {RESTS}")
 
 
 def test_a_page_without_the_permission_shows_why_it_gives_no_notification(open_console):

@@ -8,6 +8,7 @@ from equipment.fake_rosbridge import FakeRosbridge, bridged, until
 from webmap.base.errors import BridgeClosed, ConfigError, ServiceError
 from webmap.base.lifecycle import lifecycle
 from webmap.ros.bridge import Bridge
+from webmap.ros.rosbridge.calls import Calls
 from webmap.ros.temporary_bridge import TemporaryBridge
 
 NODES = {"publishers": ["/base", "/rosbridge_websocket"], "subscribers": ["/webmap"]}
@@ -100,5 +101,46 @@ def test_opening_an_unreachable_temporary_bridge_raises_the_reason():
             with pytest.raises(BridgeClosed) as raised:
                 await bridge.open()
             assert "nothing listens there" in raised.value.why
+
+    asyncio.run(scenario())
+
+
+class SlowLane:
+    """A connection that opens when the test says so."""
+
+    def __init__(self, url, *, opened, **events):
+        self.opened = opened
+        self.sent = []
+        self.state = "opening"
+        lanes.append(self)
+
+    def start(self, loop):
+        pass
+
+    def send(self, frame):
+        self.sent.append(frame)
+
+
+lanes: list[SlowLane] = []
+
+
+def test_calls_wait_for_the_connection_in_order_and_those_that_ended_are_not_sent():
+    async def scenario():
+        calls = Calls("ws://127.0.0.1:9", SlowLane)
+        running = [
+            asyncio.create_task(calls.call(name, None, None, 60.0))
+            for name in ("/first", "/second", "/third")
+        ]
+        await asyncio.sleep(0)
+        running[1].cancel()
+        await asyncio.wait(running[1:2])
+        (lane,) = lanes
+        assert lane.sent == []
+        lane.opened()
+        assert [b"/first" in lane.sent[0], b"/third" in lane.sent[1]] == [True, True]
+        assert len(lane.sent) == 2
+        for each in running:
+            each.cancel()
+        await asyncio.wait(running)
 
     asyncio.run(scenario())

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from webmap.server.bundles import (
+    EAGER,
     FIRST_PARTS,
     FIRST_SHEETS,
     PART_FOLDERS,
@@ -93,6 +94,13 @@ def test_each_module_of_webmap_is_served_once_and_a_page_starts_with_few():
     assert len(STARTS) == 3
 
 
+def test_chromium_compiles_whole_bundles_beside_the_main_thread():
+    served = served_modules(own_files(".js"))
+    for name in (*STARTS, PARTS):
+        assert served[name].startswith("//# allFunctionsCalledOnLoad\n"), name
+    assert not served["web/tools/elements.js"].startswith(EAGER)
+
+
 def test_the_bundle_of_the_first_picture_has_no_inputs_commands_and_layouts():
     text = served_modules(own_files(".js"))["web/page.js"]
     names = re.findall(r'^\$modules\["(.+)"\] \?\?= ', text, re.M)
@@ -140,7 +148,7 @@ FEW = {
 
 def test_modules_that_a_page_does_not_start_with_are_served_as_one():
     served = served_modules(FEW, ["start.js"])
-    assert served[PARTS] == (
+    assert served[PARTS] == EAGER + (
         'import { $modules } from "./start.js";\n'
         '$modules["x/own.js"] ??= (() => {\n'
         'const {\n  a,\n  b: c,\n} = $modules["both.js"];\n'

@@ -143,7 +143,7 @@ def read_part(
         ConfigError: If a value is wrong; the message lists every mistake.
 
     """
-    empty = {each.name for each in msgspec.structs.fields(cls) if each.default == ""}
+    empty = _empty(cls)
     given = {k: v for k, v in values.items() if not (k in empty and v == "")}
     if bridge:
         given["bridge"] = bridge
@@ -184,6 +184,13 @@ def _fields(cls: type[Config]) -> dict[str, _Field]:
         else:
             found[each.name] = _Field(_reader_of(hints[each.name]), each.required)
     return found
+
+
+@functools.cache
+def _empty(cls: type[Config]) -> frozenset[str]:
+    """Return the names of the fields that are empty by default."""
+    fields = msgspec.structs.fields(cls)
+    return frozenset(each.name for each in fields if each.default == "")
 
 
 @functools.cache

@@ -170,7 +170,6 @@ const STATES = Object.keys(WORDS);
 export function markRobots(map) {
   const marks = new ClusterMarks(map);
   const update = () => {
-    marks.wall = wallOf();
     const elements = [...map.world.querySelectorAll(".robot:not(.unplaced)")];
     const robots = elements.map((element) => drawn(map, element));
     const places = robots.map(({ id, x, y }) => {
@@ -187,10 +186,19 @@ export function markRobots(map) {
     marks.show(clusters.map((cluster) => cluster.map((index) => robots[index])));
     showNames(map, robots, places, joined);
   };
+  // Each reading makes the browser compute styles; only another window changes them.
+  const read = () => {
+    marks.wall = wallOf();
+  };
+  addEventListener("resize", read);
   const offs = [onBeat(update), map.onSelect(update), map.onView(() => marks.place())];
-  // With the other modules, before the next painting: it reads styles.
-  const first = requestAnimationFrame(update);
+  // With the other modules, before the next painting.
+  const first = requestAnimationFrame(() => {
+    read();
+    update();
+  });
   return () => {
+    removeEventListener("resize", read);
     cancelAnimationFrame(first);
     for (const off of offs) off();
     marks.remove();

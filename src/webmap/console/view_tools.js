@@ -226,7 +226,8 @@ const PATIENCE = 1500;
  * @param {AbortSignal} signal Ends it.
  */
 export function keepInView(map, signal) {
-  let area = map.svg.getBoundingClientRect();
+  // The observer of sizes sets it: reading it here would make the browser lay out.
+  let area = new DOMRect();
   let [width, height] = [map.width, map.height];
   /** By how much the view was moved to uncover the robot, in pixels. */
   let [x, y] = [0, 0];

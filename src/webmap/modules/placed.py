@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("webmap.modules")
 
 FRAMES = ("map", "robot")
+UNMOVED = Affine()
 
 Draw = Callable[[Transform], object]
 """Draws data in the plane, given the transform from its coordinates to those of a level
@@ -216,6 +217,11 @@ class Placed:
             if self._seen is not None:
                 place = self.robot.pose_source.common_from_own @ place
             at, heading = self.robot.position, self.robot.orientation.yaw
+            if place == UNMOVED and not self._upright:  # a trail, at each pose
+                cos, sin = math.cos(heading), math.sin(heading)
+                x, y = cos * at.x + sin * at.y, cos * at.y - sin * at.x
+                self.svg.set_pose(0.0 - x, 0.0 - y, 0.0 - heading)
+                return
             place = Affine.into_pose(Pose(at.x, at.y, heading)) @ place
         put(self.svg, place)
         for element, (x, y) in self._upright.items():

@@ -90,6 +90,9 @@ class MapPlace(NamedTuple):
     """Pixels, or 0 for the height of its container."""
 
 
+_POINT = struct.Struct("<ff").pack
+
+
 class Line:
     """The points of a line; a page gets only those that it does not have yet."""
 
@@ -98,8 +101,8 @@ class Line:
     KNOWN = 32
     """Most changes that are known one by one: a page that is later gets all points."""
 
-    def __init__(self, points: bytes) -> None:
-        self.points = bytearray(points)
+    def __init__(self, points: bytearray) -> None:
+        self.points = points
         """Pairs of 32-bit floats, little-endian: x and y."""
         self.added: deque[tuple[int, int, int]] = deque(maxlen=self.KNOWN)
         """The fragment of each change, its revision then, and how many points came."""
@@ -220,23 +223,30 @@ class Live(Parent):
             raise SceneError(f"drop must be at least 0, got {drop}")
         if data or drop:
             if not isinstance(line, Line):
-                line = self._attributes["points"] = Line(b"")
+                line = self._attributes["points"] = Line(bytearray())
             del line.points[: 8 * drop]
             line.points += data
             self._record(line, len(data) // 8)
         return self
 
-    def _packed(self, points: Iterable[tuple[float, float]]) -> bytes:
+    def _packed(self, points: Iterable[tuple[float, float]]) -> bytearray:
         if self.tag not in ("polyline", "polygon"):
             raise SceneError(f"{self!r} is not a polyline or polygon, so it is no line")
-        numbers = [number for x, y in points for number in (x, y)]
-        if not sum(map(abs, numbers)) < 3.4e38:  # which refuses NaN, too
-            raise SceneError("a line must be of finite numbers within 32 bits")
-        return struct.pack(f"<{len(numbers)}f", *numbers)
+        data = bytearray()
+        try:
+            for x, y in points:
+                if not isfinite(x + y):
+                    raise OverflowError
+                data += _POINT(x, y)
+        except OverflowError:
+            text = "a line must be of finite numbers within 32 bits"
+            raise SceneError(text) from None
+        return data
 
     def _record(self, line: Line, added: int) -> None:
-        self._touch("points")
         at = self.fragment
+        if at is not None:
+            at.touch(self, "points")
         line.added.append((0, 0, added) if at is None else (at.id, at.revision, added))
 
     def set_dots(self, points: bytes | bytearray | memoryview, unit: float) -> None:

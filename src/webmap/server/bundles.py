@@ -50,6 +50,11 @@ PART_SHEETS = "parts.css"
 SHARED_SHEET = "web/style/controls.css"
 """The style sheet that those of features import: it stays a file of its own."""
 
+EAGER = "//# allFunctionsCalledOnLoad\n"
+"""The first line of a bundle: Chromium then compiles all its functions at once, beside
+the main thread. Else it reads each function twice, the second time when it is called.
+"""
+
 _SHEET_FOLDERS = ("features/", "web/tools/")
 
 _IMPORT = re.compile(r'^import (\{[^}]*\}) from "(\.[^"]+)";$', re.M)
@@ -121,7 +126,7 @@ def _bundle(bundle: str, sources: Mapping[str, str], before: str) -> tuple[str, 
         before: The bundle before, which has the object of the exports; "" for none.
 
     """
-    text = _import(before, bundle) if before else "const $modules = {};\n"
+    text = EAGER + (_import(before, bundle) if before else "const $modules = {};\n")
     sections = []
     for name, source in sources.items():
         text += f'$modules["{name}"] ??= (() => {{\n'

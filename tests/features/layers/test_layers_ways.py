@@ -219,7 +219,7 @@ def test_a_pose_takes_as_few_calls_and_bytes_with_a_long_trail(link, robot):
     sys.setprofile(count)
     trail.on_odometry_update()
     sys.setprofile(None)
-    assert calls <= 30
+    assert calls <= 22
     assert len(trail.points[0]) > 290
     assert len(encode_changes(fragment, since)) <= 22
 

@@ -154,7 +154,7 @@ def test_a_point_of_a_line_of_any_length_takes_few_calls_and_bytes(clock):
         session.mount(fragment, under=0)
         session.frame(clock.now)
         session.receive('{"op":"seen","frame":1}')
-        assert calls_of(line.extend_line, [(1.0, 2.0)]) <= 16
+        assert calls_of(line.extend_line, [(1.0, 2.0)]) <= 13
         assert calls_of(encode_changes, fragment, fragment.revision - 1) <= 45
         head = 15 + len(bytes([Op.DELTA]) + varint(fragment.id))
         bytes_of_point = len(session.frame(clock.now)) - head

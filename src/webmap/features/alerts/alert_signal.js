@@ -42,8 +42,10 @@ export class Pace {
 export class Signals {
   constructor() {
     const { sound, notify } = readChoice();
-    /** @type {AudioContext | null} null until a press: browsers refuse it before. */
+    /** @type {AudioContext | null} null until a press or a signal. */
     this._audio = null;
+    /** Whether the browser allows sound, which it does after a press. */
+    this._mayPlay = navigator.userActivation?.hasBeenActive ?? false;
     this._sound = html("input", "", { type: "checkbox" });
     this._sound.checked = sound;
     this._notify = html("input", "", { type: "checkbox" });
@@ -66,7 +68,6 @@ export class Signals {
     for (const press of ["pointerup", "keydown"]) {
       document.addEventListener(press, () => this._unlock(), { signal, capture: true });
     }
-    if (navigator.userActivation?.hasBeenActive) this._unlock();
     this._show();
   }
 
@@ -80,7 +81,7 @@ export class Signals {
    * @param {string} body
    */
   give(title, body) {
-    if (this._sound.checked && this._audio?.state === "running") beep(this._audio);
+    if (this._sound.checked && this._mayPlay) this._play((audio) => beep(audio));
     const seen = !document.hidden && document.hasFocus();
     if (!this._notify.checked || seen || permission() !== "granted") return;
     try {
@@ -93,13 +94,21 @@ export class Signals {
     }
   }
 
+  /** Let the browser start sound now, because not every browser does so later. */
   _unlock() {
-    if (this._audio === null) {
-      this._audio = new AudioContext();
-      this._audio.addEventListener("statechange", () => this._show());
-    }
-    if (this._audio.state === "running") return;
-    this._audio.resume().catch(() => {}); // the next press tries again
+    if (this._mayPlay) return;
+    this._play((audio) => {
+      this._mayPlay = true;
+      this._show();
+      void audio.suspend();
+    });
+  }
+
+  /** @param {(audio: AudioContext) => void} fn Called when the browser plays sound. */
+  _play(fn) {
+    const audio = (this._audio ??= new AudioContext());
+    // Without a press it may fail or wait: the next press tries again.
+    audio.resume().then(() => fn(audio), () => {});
   }
 
   async _ask() {
@@ -121,7 +130,7 @@ export class Signals {
   }
 
   _show() {
-    const waits = this._sound.checked && this._audio?.state !== "running";
+    const waits = this._sound.checked && !this._mayPlay;
     setText(this._soundNote, waits ? "Sound starts after the first press on the page." : "");
     const may = permission();
     this._notify.disabled = may === "missing" || may === "insecure";
@@ -147,7 +156,7 @@ function permission() {
   return "Notification" in window ? Notification.permission : "missing";
 }
 
-/** @param {AudioContext} audio */
+/** @param {AudioContext} audio It rests afterwards: else the browser plays silence. */
 function beep(audio) {
   const gain = audio.createGain();
   gain.gain.value = 0.2;
@@ -158,6 +167,7 @@ function beep(audio) {
     tone.connect(gain);
     tone.start(audio.currentTime + index * TONE);
     tone.stop(audio.currentTime + (index + 1) * TONE);
+    if (index === TONES.length - 1) tone.onended = () => void audio.suspend();
   });
 }
 

@@ -88,12 +88,15 @@ class Trail:
         if far < self.step:
             return
         self._last = at
-        if last is None or far > max(self.jump, SPEED * self.robot.pose_source.period):
+        if last is None or (
+            far > self.jump and far > SPEED * self.robot.pose_source.period
+        ):
             self._begin(at)
             return
-        if len(self._parts[-1].points) > PART:
-            self._begin(last)
         newest = self._parts[-1]
+        if len(newest.points) > PART:
+            self._begin(last)
+            newest = self._parts[-1]
         newest.points.append(at)
         self._driven += far
         oldest, drop = self._forget_old()

@@ -81,7 +81,10 @@ class _CallsLane:
     def __init__(self, url: str, lane_type: type[BridgeConnection]) -> None:
         self._protocol = Protocol()
         self._waiting: dict[str, asyncio.Future[ServiceResponse]] = {}
-        self._ready: asyncio.Future[None] = asyncio.Future()
+        self._unsent: dict[str, bytes] | None = {}
+        """The frames that wait for the connection; None when it has opened."""
+        self._failure: Exception | None = None
+        """Why it has not opened."""
         self._retired = False
         self._ending: asyncio.Task[None] | None = None
         self._unreadable: str | None = None
@@ -110,14 +113,20 @@ class _CallsLane:
         )
 
     async def ask(self, id: str, frame: bytes) -> ServiceResponse:
-        await asyncio.shield(self._ready)
+        if self._failure is not None:
+            raise self._failure
         answer: asyncio.Future[ServiceResponse] = asyncio.Future()
         self._waiting[id] = answer
         try:
-            self._lane.send(frame)
+            if self._unsent is None:
+                self._lane.send(frame)
+            else:  # thousands may wait: one future for all would search all for each
+                self._unsent[id] = frame
             return await answer
         finally:
             del self._waiting[id]
+            if self._unsent is not None:
+                self._unsent.pop(id, None)
             self._end_if_idle()
 
     def end_when_idle(self) -> None:
@@ -132,13 +141,13 @@ class _CallsLane:
         await self._lane.stop()
 
     def _opened(self) -> None:
-        if not self._ready.done():
-            self._ready.set_result(None)
+        waiting, self._unsent = self._unsent or {}, None
+        for frame in waiting.values():
+            self._lane.send(frame)
 
     def _over(self, error: Exception) -> None:
-        if not self._ready.done():
-            self._ready.set_exception(error)
-            self._ready.exception()  # mark as retrieved
+        if self._unsent is not None:
+            self._failure = error
         for answer in self._waiting.values():
             if not answer.done():
                 answer.set_exception(error)
