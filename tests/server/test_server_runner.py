@@ -206,6 +206,7 @@ def test_the_url_has_no_token_if_a_host_application_authenticates_viewers():
         ),
         ({"embed_from": ["a.example"]}, "an origin is a scheme"),
         ({"public_url": "example.com"}, "the public URL"),
+        ({"public_url": "http://example.com"}, "without TLS anyone"),
     ],
 )
 def test_options_of_a_proxy_or_a_frame_that_are_not_safe_are_refused(options, words):

@@ -242,6 +242,8 @@ def _serve(
         "embed_driving": embed_driving,
     }
     encrypted = certificate is not None or proxies.origin.startswith("https:")
+    for name in proxies.names:
+        check_exposure(name, tls=encrypted, insecure_lan=insecure_lan)
     if settings["embed_from"] and not encrypted and not is_loopback(host):
         raise ConfigError("browsers show WebMap in a frame of another page with TLS")
     if proxy_user_header:
