@@ -13,7 +13,6 @@ import threading
 
 from safety_corpus import CORPUS
 from safety_crowd import sign_in
-from safety_load import run_separately
 from websockets.asyncio.client import connect
 from websockets.exceptions import WebSocketException
 
@@ -55,7 +54,7 @@ def events(n):
 async def main(url):
     root = url.partition("/?")[0]
     keys = [await asyncio.to_thread(sign_in, url) for _ in range(2)]
-    run_separately()  # not before: on a busy machine, the start would take long
+    os.nice(19)  # not before: on a busy machine, the start would take long
     print("ready", flush=True)
     await asyncio.gather(
         *(flood(root, key, "drive?id=d{}", commands) for key in keys),
