@@ -435,7 +435,7 @@ class OpenPages:
             self._unbuilt[viewer] = waiting  # now the last
         if self._unbuilt:
             asyncio.get_running_loop().call_soon(self._build_next)
-        # A page makes many objects, so it would make a collection due, of the robots too.
+        # The objects of a page would make a collection due, which looks at all robots.
         gc.freeze()
         host.build(sizes)
 
