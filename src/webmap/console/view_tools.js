@@ -226,13 +226,14 @@ const PATIENCE = 1500;
  * @param {AbortSignal} signal Ends it.
  */
 export function keepInView(map, signal) {
-  // The observer of sizes sets it: reading it here would make the browser lay out.
-  let area = new DOMRect();
+  /** @type {DOMRect | null} null until the first check: reading it makes a layout. */
+  let area = null;
   let [width, height] = [map.width, map.height];
   /** By how much the view was moved to uncover the robot, in pixels. */
   let [x, y] = [0, 0];
   const check = () => {
-    const [before, now] = [area, map.svg.getBoundingClientRect()];
+    const now = map.svg.getBoundingClientRect();
+    const before = area ?? now;
     // The map has not adapted its view yet; its new size comes here next.
     if (Math.abs(now.width - map.width) > 1 || Math.abs(now.height - map.height) > 1) return;
     area = now;

@@ -438,7 +438,7 @@ class OpenPages:
             self._unbuilt[viewer] = waiting  # now the last
         if self._unbuilt:
             asyncio.get_running_loop().call_soon(self._build_next)
-        # A page makes many objects: a collection would be due, of the robots too.
+        # The objects of a page would make a collection due, which looks at all robots.
         gc.freeze()
         host.build(sizes)
 
