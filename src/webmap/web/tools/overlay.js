@@ -43,8 +43,7 @@ export function lay(map, panel, corner, place = "") {
 const unsorted = new Set();
 
 /**
- * Sort panels before the browser paints them: each reading of a place makes the browser
- * compute styles, so all are read at once.
+ * Sort panels before the browser paints them.
  *
  * @param {Element} own
  */
@@ -54,27 +53,28 @@ function sortSoon(own) {
 }
 
 function sortAll() {
-  const sorted = [...unsorted].map((own) => {
-    const panels = [...own.children].map((panel) => ({ panel, place: placeOf(panel) }));
-    return { own, panels: panels.sort((one, other) => one.place - other.place) };
-  });
-  unsorted.clear();
-  for (const { own, panels } of sorted) {
+  for (const own of unsorted) {
+    const panels = [...own.children].map((panel) => ({ panel, place: placeOf(panel, own) }));
+    panels.sort((one, other) => one.place - other.place);
     panels.forEach(({ panel }, index) => {
       const there = own.children[index];
       // A panel that is moved loses the focus.
       if (there !== panel) own.insertBefore(panel, there ?? null);
     });
   }
+  unsorted.clear();
 }
 
 /**
  * @param {Element} panel
- * @returns {number} Its place among others in the page's own element, which the page
- *     sets in CSS with `--place`; the Tab key goes in this order.
+ * @param {Element} own
+ * @returns {number} Its place in the page's own element, which has the classes of its
+ *     panels in `data-webmap-order`; others are last. The Tab key goes in this order.
  */
-function placeOf(panel) {
-  return Number(getComputedStyle(panel).getPropertyValue("--place")) || 0;
+function placeOf(panel, own) {
+  const order = own.getAttribute("data-webmap-order")?.split(" ") ?? [];
+  const place = order.findIndex((name) => panel.classList.contains(`webmap-${name}`));
+  return place < 0 ? order.length : place;
 }
 
 /**
