@@ -293,6 +293,7 @@ class AccessControl:
             and request.host.lower().removesuffix(f":{request.port}") in LOOPBACK
             and not request.forwarded
             and not self._settings.origins
+            and not self._settings.proxies.trusted
             and self._settings.authenticate is None
         )
 
