@@ -44,7 +44,7 @@ def test_the_card_and_its_parts_stay_in_place_in_each_state(open_console):
     page.wait_for_function(
         "() => document.querySelector('.cameras img').naturalWidth === 320"
     )
-    expect(page.locator("#card .card-health")).to_contain_text("All OK")
+    expect(page.get_by_role("region", name="Health")).to_contain_text("All OK")
     expect_state(page, "Free")
     places = page.evaluate(PLACES)
     hold(page.keyboard, "a", lambda: title(page).text_content() == "You are driving")

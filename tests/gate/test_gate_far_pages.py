@@ -206,6 +206,7 @@ def test_listeners_learn_who_asks_to_end_a_stop_and_why_control_ended(bench):
     bench.page.receive('{"op":"reset","robot":"r1","stop":"5f0c"}')
     bench.page.receive('{"op":"cancel","robot":"r1"}')
     bench.page.receive('{"op":"reset","robot":7}')
+    bench.page.receive('{"op":"take","robot":"reset"}')
     bench.receive(Refused(bench.id, "r1", "reset", "only an operator may"))
     bench.receive(Refused(bench.id, "r1", "lease", "the page was closed"))
     bench.page.close()
@@ -217,4 +218,4 @@ def test_listeners_learn_who_asks_to_end_a_stop_and_why_control_ended(bench):
         LeaseEnded("r1", "the page was closed"),
         PageAsked("r1", "cancel", "", None),
     ]
-    assert len(bench.link.sent) == 6  # each command went to the gate all the same
+    assert len(bench.link.sent) == 7  # each command went to the gate all the same

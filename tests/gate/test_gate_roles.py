@@ -24,6 +24,7 @@ LEAST = {
     commands.Grant: "operator",
     commands.Deny: "operator",
     commands.StopTest: "operator",
+    commands.Check: "operator",
 }
 """The least role for each command; the test is in the gate's own code."""
 
@@ -42,6 +43,9 @@ HELD = (
 AFTER = {
     commands.Grant: ["control is handed over to B"],
     commands.StopTest: ["no odometry: the stop test needs odometry"],
+    commands.Check: [
+        "press STOP, wait until it is confirmed with its stop hooks, and reset it first"
+    ],
 }
 """What a page gets although it has the rights."""
 
@@ -93,7 +97,12 @@ def test_a_role_may_send_a_command_or_it_changes_nothing(kind, role):
         return
     bench.run(0.3)
     assert kind is commands.Release or bench.refusals("c")
-    for action in (actions.SendGoal, actions.SendPose, actions.SaveStop):
+    for action in (
+        actions.SendGoal,
+        actions.SendPose,
+        actions.SaveStop,
+        actions.SaveCheck,
+    ):
         assert bench.did(action) == []
     assert [each for each in bench.written if not each.twist.is_zero] == []
     after = bench.report()

@@ -464,7 +464,7 @@ def test_statuses_of_a_hostile_bridge_do_not_forge_or_flood_the_log(caplog):
         errors = []
         async with bridged() as (server, bridge):
             bridge.on_error(errors.append)
-            words = "bad\\nERROR webmap.gate: forged \\u001b[2J" + "x" * 100_000
+            words = "bad\\nERROR webmap.gate: forged \\u001b[2J" + "x" * 5000
             for _ in range(300):
                 await server.send(f'{{"op":"status","level":"error","msg":"{words}"}}')
             await until(lambda: len(errors) == 300)

@@ -405,7 +405,10 @@ class WorldView(Extendable):
         if part is None:
             return False
         least, viewer = least_role(part.module, message), self.page.viewer
-        if not covers(viewer.role, least):
+        if least is None:
+            name = type(part.module).__name__
+            self.show_error(f"{name} has no such message: reload the page.")
+        elif not covers(viewer.role, least):
             self.show_error(who_may(least))
         elif least != "viewer" and not all(map(viewer.may_drive, _robots_in(message))):
             self.show_error(NOT_YOURS)
@@ -448,18 +451,24 @@ class WorldView(Extendable):
         )
 
 
-def least_role(module: object, message: Mapping[str, Any]) -> Role:
+def least_role(module: object, message: Mapping[str, Any]) -> Role | None:
     """Return the least role of a viewer whose page may send a module a message.
 
     The class of the module states it in ``MAY_SEND``: a role for each ``op`` of its
-    messages, or for each of their fields if they have no ``op``. What is not stated
-    needs an operator.
+    messages, or for each of their fields if they have no ``op``. Further fields need an
+    operator, and so do the messages of a class without ``MAY_SEND``.
+
+    Returns:
+        None if the class states others, so that nobody may send the message.
     """
-    stated: Mapping[str, Role] = getattr(type(module), "MAY_SEND", {})
+    stated: Mapping[str, Role] | None = getattr(type(module), "MAY_SEND", None)
+    if stated is None:
+        return "operator"
     op = message.get("op")
     names = [op] if isinstance(op, str) else message
-    roles = [stated.get(name, "operator") for name in names]
-    return max(roles, key=ROLES.index, default="operator")
+    if stated.keys().isdisjoint(names):
+        return None
+    return max((stated.get(name, "operator") for name in names), key=ROLES.index)
 
 
 def _robots_in(message: object) -> Iterator[str]:

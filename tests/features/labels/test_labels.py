@@ -217,7 +217,7 @@ def test_a_viewer_cannot_add_labels(channel, tmp_path, said):
     page = Page(entry, channel, Viewer("v", "V", "viewer"), None, {})
     module = Map(page.element("map"), 700, 500).add_module("Labels")
     module.on_message({"add": DESK})
-    assert said == [{"refused": "only operators can add, move and delete labels"}]
+    assert said == [{"refused": "only admins can add, move and delete labels"}]
     assert module.layer.added.labels == {}
     page.close()
 

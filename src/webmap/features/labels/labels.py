@@ -253,15 +253,11 @@ class AddedLabels:
 ORDER = 90.0
 """Below the robots, above everything else."""
 
-MAY_ADD = ("operator", "admin")
-"""Roles that may edit labels."""
-
-
 @map_modules.register
 class Labels:
     """Shows named places, upright and at a constant size at every zoom.
 
-    Labels come from the program, from a file, and from pages, where people add them;
+    Labels come from the program, from a file, and from pages, where admins add them;
     added labels are stored on this machine and appear on every page that has labels of
     the same name. A press on a label offers to send the selected robot there.
 
@@ -273,7 +269,7 @@ class Labels:
             ``icon``, ``kind`` (a class) and ``yaw`` in radians.
         file: A YAML or JSON file with such a list.
         name: The name of the file in the state folder for added labels.
-        editable: Whether labels can be added, moved and removed on the page.
+        editable: Whether admins can add, move and remove labels on the page.
         key: The key that begins to add a label.
 
     Raises:
@@ -282,10 +278,10 @@ class Labels:
 
     MAY_SEND: ClassVar[Mapping[str, Role]] = {
         "goal": "operator",
-        "add": "operator",
-        "move": "operator",
-        "to": "operator",
-        "remove": "operator",
+        "add": "admin",
+        "move": "admin",
+        "to": "admin",
+        "remove": "admin",
     }
 
     def __init__(
@@ -305,7 +301,7 @@ class Labels:
         if file is not None:
             configured = read_labels((*configured, *label_file(file)), "labels")
         self.map = map
-        self.may_edit = editable and map.page.viewer.role in MAY_ADD
+        self.may_edit = editable and map.page.viewer.role == "admin"
         self.layer = LabelLayer.shared(name, configured)
         self.layer.show_on(map, order=ORDER)
         self.browser_part = map.add_browser_part(
@@ -337,7 +333,7 @@ class Labels:
                 if sent is not None:
                     self.map.notify_modules("on_goal_sent", *sent)
             elif not self.may_edit:
-                raise ConfigError("only operators can add, move and delete labels")
+                raise ConfigError("only admins can add, move and delete labels")
             elif "add" in message:
                 self.layer.add(new_label(message["add"]))
                 self.browser_part.send({"done": True})
