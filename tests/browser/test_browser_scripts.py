@@ -43,6 +43,7 @@ MADE = {
     "asker": {"connection": "c", "left": 5.0, "name": ""},
     "holder": {"connection": "c", "name": ""},
     "test": {"state": "failed", "text": ""},
+    "check": {"every": None, "by": "", "at": 0.0},
     "goal": {
         **{"id": "g", "x": 1.0, "y": 1.0, "yaw": 0.0, "by": "c", "why": ""},
         **{"method": "navigate_to_pose", "state": "failed", "left": None},

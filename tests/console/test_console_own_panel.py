@@ -51,7 +51,7 @@ def test_the_page_beside_the_console_shows_its_robots_without_controls(
 
     async def run() -> None:
         example = runpy.run_path(str(EXAMPLES / "wall.py"), run_name="example")
-        assert set(site.pages) == {"/", "/wall"}
+        assert set(site.pages) == {"/", "/hand-over", "/wall"}
         entry, sizes = site.pages["/wall"], {"webmap_container": (800.0, 600.0)}
         page = Page(entry, SceneSession(), Viewer("v1", "Ann"), None, sizes)
         with page.scope.active():

@@ -137,6 +137,17 @@ test("one place is asked for at a time, then the newest", () => {
   assert.deepEqual(asked.at(-1), { x: 9, y: 2 }, "a lost answer is not waited for");
 });
 
+test("the next place is asked for while the last answer is on its way", () => {
+  const { mark, asked } = groundMark();
+  mark.show({ x: 1, y: 0 });
+  mark.show(null);
+  mark.show({ x: 2, y: 0 }, "Robot 2");
+  assert.deepEqual(asked.at(-1), { x: 2, y: 0 });
+  mark.hear({ x: 1, y: 0, word: "wall" });
+  mark.hear({ x: 2, y: 0, word: "free" });
+  assert.equal(mark.word, "free");
+});
+
 test("where no map is, no word is shown, and the place is not asked for again", () => {
   const { mark, asked } = groundMark();
   mark.show({ x: 1, y: 0 });

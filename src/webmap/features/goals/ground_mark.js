@@ -56,7 +56,7 @@ export class GroundMark {
   show(place, name = "") {
     this._place = place;
     this._name = name;
-    if (place === null) this._asked = null;
+    if (place === null) [this._asked, this._askedAt] = [null, -Infinity];
     else this._look(place);
     this._draw();
   }

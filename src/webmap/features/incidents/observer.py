@@ -171,7 +171,8 @@ class RobotObserver:
                 continue
             if newest is not self._scan:
                 self._scan, self._scan_at = newest, now
-                stamp = time - round((now - newest[1]) * 1e9)
+                age = now - newest[1] + module.bridge.lag
+                stamp = time - round(age * 1e9)
                 self.records.append(scan_record(module, newest[0], time, stamp))
             return  # of several scanners the first one
 

@@ -253,6 +253,7 @@ class AddedLabels:
 ORDER = 90.0
 """Below the robots, above everything else."""
 
+
 @map_modules.register
 class Labels:
     """Shows named places, upright and at a constant size at every zoom.

@@ -99,7 +99,7 @@ class LaserScanner(RobotLayer):
         """Make the path of all dots."""
         self.dots = self.add(svg.path(class_="dot"))
         self.newest_scan: tuple[LaserScanMsg, float] | None = None
-        """The newest scan, and when it was sent, in seconds of ``time.monotonic()``."""
+        """The newest scan, and when it arrived, in seconds of ``time.monotonic()``."""
 
     def read(self, message: LaserScanMsg) -> Rays:
         """Return the rays, relative to the sensor at the first one.
@@ -116,7 +116,7 @@ class LaserScanner(RobotLayer):
         if 0.0 < took <= LONGEST_SWEEP:
             moved = self.placed.moved_within(message.frame_id, message.stamp, took)
             rays = replace(rays, moved=(moved.x, moved.y, moved.yaw))
-        self.newest_scan = message, time.monotonic() - self.bridge.lag
+        self.newest_scan = message, time.monotonic()
         return rays
 
     def draw(self, found: Rays, at: Transform) -> None:

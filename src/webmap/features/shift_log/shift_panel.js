@@ -162,7 +162,7 @@ class ShiftPanel {
     this._problem = html("p", "webmap-problem", { role: "status" });
     const add = button("", "Add note", () => {});
     add.type = "submit";
-    const form = html("form", "webmap-row webmap-shift-note", {}, this._note, add);
+    const form = html("form", "webmap-row wraps webmap-shift-note", {}, this._note, add);
     form.addEventListener("submit", (event) => {
       event.preventDefault();
       this._send({ note: this._note?.value ?? "", about: this._robot.value });
