@@ -63,7 +63,7 @@ def test_an_open_list_in_the_dock_does_not_cover_the_selected_robot(
     for name in ("Robot 1", "Robot 4", "Robot 7"):
         select(page, name)
         for tool in ("Layers", "Log", "Route"):
-            summary = page.locator(".tools summary", has_text=tool)
+            summary = page.locator(f".tools summary[title={tool}]")
             summary.evaluate("e => e.click()")  # it may be folded into More
             page.wait_for_timeout(300)
             assert page.evaluate(ROBOT) == "free", (name, tool)

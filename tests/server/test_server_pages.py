@@ -269,6 +269,7 @@ class Grid(Layer):
         self.svg.append(webmap.svg.rect(width=message, height=1))
 
 
+@pytest.mark.timeout(600)  # it runs with the time that tests of browsers leave
 def test_a_thousand_pages_opened_and_closed_leave_nothing_behind(loop, monkeypatch):
     monkeypatch.setattr(host_module, "KEPT_FOR", 0.0)
     link = Link()
