@@ -55,6 +55,11 @@ export class GoalMarks {
     ];
   }
 
+  /** @param {boolean} aiming Whether a press is for the map below the buttons. */
+  letThrough(aiming) {
+    this._labels.classList.toggle("aiming", aiming);
+  }
+
   destroy() {
     for (const off of this._offs) off();
   }

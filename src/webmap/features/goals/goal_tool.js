@@ -150,6 +150,7 @@ class GoalTool {
     this._wanted = false;
     this._placed.clear();
     this._ground.show(null);
+    this._marks.letThrough(active);
     this._show();
   }
 
