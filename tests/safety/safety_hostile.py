@@ -81,7 +81,7 @@ class Driven(NamedTuple):
     """The most steal time of all processors in a quarter of a second."""
 
     waited: float
-    """The longest wait of one thread for a processor in a quarter of a second."""
+    """The waits for a processor in a quarter of a second, added over all processes."""
 
 
 @contextlib.contextmanager

@@ -95,9 +95,16 @@ class Contention:
 
     @property
     def waited(self) -> float:
-        """The longest wait of one thread within the window, in seconds."""
-        waits = self._waits.values()
-        return max((most_within(self.WINDOW, each) for each in waits), default=0.0)
+        """The longest wait of a command within the window, in seconds.
+
+        A command passes through all processes in turn, so their waits add up. Of the
+        threads of a process the one that waited longest counts.
+        """
+        longest: dict[int, float] = {}
+        for (pid, _), waits in self._waits.items():
+            waited = most_within(self.WINDOW, waits)
+            longest[pid] = max(waited, longest.get(pid, 0.0))
+        return sum(longest.values())
 
     def _watch(self) -> None:
         while not self._end.wait(self.PERIOD):
