@@ -8,9 +8,9 @@ module is one instance, also if a page loads a bundle again after a failure: at 
 address of a module within a bundle is a module that exports the same objects, for
 modules of users. The style sheets of features are served as one too.
 
-Comments on lines of their own are left out, and their lines stay empty, so that lines
-have the same numbers everywhere. A source map has the sources as they were written; a
-browser loads it for its debugger only.
+Indentation and comments on lines of their own are left out, and lines of comments stay
+empty, so that lines have the same numbers everywhere. A source map has the sources as
+they were written; a browser loads it for its debugger only.
 
 The modules are WebMap's own and written in one style, which :func:`served_modules`
 checks: named imports and exports, each on lines of its own. Modules of users are served
@@ -63,6 +63,7 @@ _EXPORT = re.compile(
 )
 _OTHER = re.compile(r"^(?:import|export)\b", re.M)
 _COMMENT = re.compile(r"^[ \t]*(?://.*|/\*[^*]*\*+(?:[^/*][^*]*\*+)*/[ \t]*)$", re.M)
+_INDENTATION = re.compile(r"(?<=\n)[ \t]+")
 _SHEET = re.compile(r'((?:@import url\("[^"]+"\);\s*)*)(.*)', re.S)
 
 
@@ -163,7 +164,7 @@ def _statements(name: str, source: str) -> str:
         names = found[1].replace(" as ", ": ")
         return f'const {names} = $modules["{_beside(name, found[2])}"];'
 
-    text = without_comments(_EXPORT.sub("", _IMPORT.sub(imported, source)))
+    text = shortened(_EXPORT.sub("", _IMPORT.sub(imported, source)))
     exports = _EXPORT.findall(source)
     pairs = [f"default: {local}" if default else local for default, local in exports]
     return f"{text}\nreturn {{ {', '.join(pairs)} }};\n"
@@ -204,7 +205,7 @@ def served_sheets(
 
     def rules(name: str) -> str:
         """Return the rules of a sheet and of those that it imports."""
-        found = _SHEET.fullmatch(without_comments(sources[name]).lstrip())
+        found = _SHEET.fullmatch(shortened(sources[name]).lstrip())
         if found is None or "@import" in found[2]:
             raise ValueError(f"{name} has an import of another form or after rules")
         needed = [_beside(name, one) for one in re.findall('"(.+)"', found[1])]
@@ -225,9 +226,17 @@ def served_sheets(
     return texts
 
 
-def without_comments(text: str) -> str:
-    """Return a text without comments on lines of their own, which stay empty."""
-    return _COMMENT.sub(lambda found: "\n" * found[0].count("\n"), text)
+def shortened(text: str) -> str:
+    """Return a text without indentation and without comments on lines of their own.
+
+    The lines of comments stay empty. Text in backticks is not changed.
+    """
+    text = _COMMENT.sub(lambda found: "\n" * found[0].count("\n"), text)
+    code, *others = text.split("`")
+    parts = [_INDENTATION.sub("", code)]
+    for number, part in enumerate(others, 1):
+        parts.append(part if number % 2 else _INDENTATION.sub("", part))
+    return "`".join(parts)
 
 
 def _beside(name: str, address: str) -> str:
