@@ -5,6 +5,7 @@ from collections import Counter
 
 import pytest
 
+from equipment.gate_reports import robot_report
 from webmap.core import shift_events
 from webmap.core.shift_events import ShiftWatch, quantile
 from webmap.core.shift_log import ShiftLog
@@ -18,7 +19,6 @@ from webmap.gate.protocol import (
     LeaseEnded,
     PageAsked,
     RobotGone,
-    RobotReport,
     SentPose,
     StopReport,
 )
@@ -29,37 +29,7 @@ STILL = (0.0,) * 6
 
 
 def report(**values):
-    usual = {
-        "robot": "r1",
-        "name": "Bob",
-        "state": "free",
-        "doing": "free",
-        "latched": False,
-        "stop": None,
-        "holder": None,
-        "epoch": None,
-        "asker": None,
-        "changing": False,
-        "armed": False,
-        "v": math.inf,
-        "w": math.inf,
-        "why": (),
-        "link": "up",
-        "sent": STILL,
-        "echoed": None,
-        "measured": None,
-        "alarm": None,
-        "age": None,
-        "reaction": 0.3,
-        "brake": 0.5,
-        "stop_time": None,
-        "stop_source": None,
-        "stop_date": None,
-        "test": None,
-        "armable": True,
-        "reason": None,
-    }
-    return RobotReport(**(usual | values))
+    return robot_report(**({"v": math.inf, "w": math.inf} | values))
 
 
 def held(by=ANA, **values):

@@ -6,6 +6,7 @@ import threading
 import msgspec
 import pytest
 
+from equipment.gate_reports import robot_report
 from webmap.gate.display.client import GateClient
 from webmap.gate.protocol import (
     AskerReport,
@@ -22,7 +23,6 @@ from webmap.gate.protocol import (
     Refused,
     Rename,
     RobotGone,
-    RobotReport,
     Speeds,
     StopReport,
     TakeReply,
@@ -31,36 +31,7 @@ from webmap.gate.protocol import (
 
 PREFIX = "ann.4f/"
 
-REPORT = RobotReport(
-    robot="r1",
-    name="Bob",
-    state="held",
-    doing="held",
-    latched=False,
-    stop=None,
-    holder=None,
-    epoch=None,
-    asker=None,
-    changing=False,
-    armed=False,
-    v=1.0,
-    w=1.0,
-    why=(),
-    link="up",
-    sent=(0.0,) * 6,
-    echoed=None,
-    measured=None,
-    alarm=None,
-    age=None,
-    reaction=0.3,
-    brake=0.5,
-    stop_time=None,
-    stop_source=None,
-    stop_date=None,
-    test=None,
-    armable=True,
-    reason=None,
-)
+REPORT = robot_report(state="held", doing="held")
 
 
 class Link:

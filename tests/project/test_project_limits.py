@@ -2,6 +2,7 @@
 
 from benchmarks import peers
 from benchmarks.limits import AGE_99, Watch, end_of, plot, ramp
+from equipment.gate_reports import robot_report
 
 
 def ages(**by_count):
@@ -46,15 +47,8 @@ def test_the_plot_has_the_ages_of_each_ramp():
 def test_an_age_of_the_gate_counts_once_for_each_message():
     watch = Watch()
     for measured in ((2.0,), (2.0,), None, (2.1,)):
-        watch.note(report(measured))
+        watch.note(robot_report(measured=measured))
     assert len(watch.ages) == 2
-
-
-def report(measured):
-    from webmap.gate.protocol import RobotReport
-
-    values = dict.fromkeys(RobotReport.__struct_fields__)
-    return RobotReport(**(values | {"robot": "r1", "measured": measured}))
 
 
 def test_a_peer_that_is_not_installed_is_left_out_with_what_installs_it(

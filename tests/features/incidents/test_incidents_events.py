@@ -3,40 +3,12 @@
 import msgspec
 import pytest
 
+from equipment.gate_reports import robot_report
 from webmap.features.incidents.incidents import AFTER, APART, Keeping
 from webmap.features.incidents.observer import events_between
-from webmap.gate.protocol import GoalReport, Holder, RobotReport, StopReport
+from webmap.gate.protocol import GoalReport, Holder, StopReport
 
-FREE = RobotReport(
-    robot="r1",
-    name="Bob",
-    state="free",
-    doing="free",
-    latched=False,
-    stop=None,
-    holder=None,
-    epoch=None,
-    asker=None,
-    changing=False,
-    armed=False,
-    v=1.0,
-    w=1.0,
-    why=(),
-    link="up",
-    sent=(0.0,) * 6,
-    echoed=None,
-    measured=None,
-    alarm=None,
-    age=None,
-    reaction=0.3,
-    brake=0.5,
-    stop_time=None,
-    stop_source=None,
-    stop_date=None,
-    test=None,
-    armable=True,
-    reason=None,
-)
+FREE = robot_report()
 
 
 def with_stop(confirmed=None, id="s1", why="", doing="stopped"):
