@@ -114,9 +114,9 @@ def test_the_trail_of_an_aligned_robot_ends_at_the_robot(link, bob):
     bob.set_alignment(10.0, 0.0, 90.0)
     trail = bob.add_module("Trail")
     for step in range(4):
-        go(link, step / 10, 0.0, seconds=100.0 + step)
+        go(link, step / 8, 0.0, seconds=100.0 + step)
     ((*_, last),) = trail.points
-    assert to_root(trail.svg).apply(*last) == pytest.approx((10.0, 0.3))
+    assert to_root(trail.svg).apply(*last) == pytest.approx((10.0, 0.375))
 
 
 @pytest.mark.parametrize("map_frame", [None, "map"])

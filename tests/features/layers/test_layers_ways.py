@@ -212,16 +212,23 @@ def test_a_pose_takes_as_few_calls_and_bytes_with_a_long_trail(link, robot):
         calls += event in ("call", "c_call")
 
     for i in range(400):
-        go(link, 0.1 * i, 0)
+        go(link, 0.125 * i, 0)
     fragment = robot.svg.fragment
     since = fragment.revision
-    robot.position = Vector3(40.0, 0.0, 0.0)
+    robot.position = Vector3(50.0, 0.0, 0.0)
     sys.setprofile(count)
     trail.on_odometry_update()
     sys.setprofile(None)
     assert calls <= 22
-    assert len(trail.points[0]) > 290
+    assert len(trail.points[0]) > 230
     assert len(encode_changes(fragment, since)) <= 22
+
+
+def test_a_robot_at_half_a_metre_per_second_adds_a_point_every_second_pose(link, robot):
+    trail = robot.add_module("Trail")
+    for i in range(41):
+        go(link, 0.0501 * i, 0)
+    assert len(trail.points[0]) == 21
 
 
 def test_a_trail_that_is_shorter_than_a_step_is_one_step(link, robot):

@@ -45,7 +45,7 @@ class Trail:
         robot: "Robot",
         *,
         length: float = 20.0,
-        step: float = 0.05,
+        step: float = 0.1,
         jump: float = 1.0,
     ) -> None:
         for name, value in (("length", length), ("step", step), ("jump", jump)):
