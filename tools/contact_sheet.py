@@ -79,8 +79,10 @@ def send_goal(page: Page) -> None:
 
 
 def reset(page: Page) -> None:
-    """End a STOP: its button needs two deliberate presses."""
+    """End a STOP, if there is one: its button needs two deliberate presses."""
     button = page.locator(".webmap-stop-list .webmap-reset").first
+    if not button.count():
+        return
     button.dispatch_event("click")
     page.wait_for_timeout(500)
     button.dispatch_event("click")
@@ -138,6 +140,7 @@ def pictures(browser: Browser, url: str, size: str, scheme: str) -> list[Image.I
     page.locator(".robot:not(.unplaced)").nth(1).wait_for()
     page.locator(".webmap-teleop-stop").wait_for(state="attached")
     page.wait_for_timeout(2000)
+    reset(page)  # the sheet before ended with a STOP
     narrow = width <= 896
     for name, steps in STATES:
         if "phone" in name and not narrow:
