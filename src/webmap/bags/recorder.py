@@ -106,16 +106,23 @@ class Ros2Bag:
     """A folder with an MCAP file and its description.
 
     MCAP holds the definitions of the types, and most of an unclosed file can be
-    recovered. rosbags writes sqlite3 as one transaction, of which nothing would remain.
+    recovered: all but the last chunk, which is a megabyte before its compression.
+    rosbags writes sqlite3 as one transaction, of which nothing would remain.
     """
 
     def __init__(self, path: Path) -> None:
-        from rosbags.rosbag2 import StoragePlugin, Writer
+        from rosbags.rosbag2 import (
+            CompressionFormat,
+            CompressionMode,
+            StoragePlugin,
+            Writer,
+        )
 
         self.path = path
         self._writer = Writer(
             path, version=METADATA_VERSION, storage_plugin=StoragePlugin.MCAP
         )
+        self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
         self._writer.open()
 
     def add(self, topic: str, version: TypeVersion) -> Any:
