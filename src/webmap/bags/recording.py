@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from webmap.bags.times import SECOND
-from webmap.bags.types import MessageConverter, texts_of
+from webmap.bags.types import MessageConverter, bytes_of_json, texts_of
 from webmap.base.errors import ConfigError
 from webmap.base.plain_files import refuse_special, resolved
 from webmap.ros.definitions import Definitions, UnknownType
@@ -16,6 +16,8 @@ from webmap.ros.rosbridge.server.schema import Schema
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
     from rosbags.interfaces import Connection
+
+    from webmap.bags.mcap_file import McapFile
 
 NAMES = ("map", "tf_static", "robot_description")
 """Names of topics that latch, even if the bag does not mark them so."""
@@ -123,12 +125,12 @@ class Recording:
         """Its files or its folder."""
         self.name = recording_name(paths)
         """The name, as shown to people."""
-        self.dialect: DialectName = _dialect(paths)
         self._warn = warn
         self._failed: set[str] = set()
         self._closed = False
-        self._reader = _opened(paths, self.dialect)
+        self._reader, self.dialect = _opened(paths, _dialect(paths))
         try:
+            self._warn_of_cut_files()
             self.begin = self._reader.start_time
             """Time of the first message, in nanoseconds since 1970."""
             self.end = self._reader.end_time
@@ -245,8 +247,12 @@ class Recording:
         None if its bytes do not fit its type, which is reported once for each topic.
         """
         try:
-            value = self._reader.deserialize(recorded.data, recorded.connection.msgtype)
-            return self._messages.message(self.topics[recorded.topic].type, value)
+            type_name, data = self.topics[recorded.topic].type, recorded.data
+            if _is_json(recorded.connection):
+                fields = self.schema.fields(type_name)
+                data = bytes_of_json(fields, data, ros2=self.dialect == "ros2")
+            value = self._reader.deserialize(data, recorded.connection.msgtype)
+            return self._messages.message(type_name, value)
         except Exception as error:
             if recorded.topic not in self._failed:
                 self._failed.add(recorded.topic)
@@ -276,6 +282,9 @@ class Recording:
         _add_defaults(self._reader, self.dialect)
         usable = []
         for connection in self._reader.connections:
+            if why := _why_unreadable(connection):
+                self._leave_out(connection, why)
+                continue
             try:
                 texts = texts_of(self._reader.typestore, connection.msgtype)
                 type_name = canonical(connection.msgtype)
@@ -300,6 +309,15 @@ class Recording:
         if not usable:
             raise ConfigError(f"{self.name}: none of its topics can be played")
         return usable
+
+    def _warn_of_cut_files(self) -> None:
+        """Report each file that ends too early; it is played up to there."""
+        for file in _mcap_files(self._reader):
+            if file.cut:
+                self._warn(
+                    f"{self.name} is played only up to where it can be read: "
+                    f"{file.cut}; `mcap recover` makes a complete file of that part"
+                )
 
     def _leave_out(self, connection: "Connection", why: str) -> None:
         self._warn(
@@ -330,7 +348,7 @@ def _repair(paths: Sequence[Path]) -> str:
     folder = "`ros2 bag reindex` repairs the metadata.yaml of its folder"
     if ".mcap" in suffixes:
         return f"if the file was not closed, `mcap recover` repairs it, and {folder}"
-    return f"if the file was not closed, {folder}"
+    return f"`sqlite3 FILE .recover` reads what is left of a .db3 file, and {folder}"
 
 
 def _reason(error: Exception) -> str:
@@ -381,18 +399,62 @@ def _refuse_endless(path: Path) -> None:
         )
 
 
-def _opened(paths: Sequence[Path], dialect: DialectName) -> "AnyReader":
+def _opened(
+    paths: Sequence[Path], dialect: DialectName
+) -> "tuple[AnyReader, DialectName]":
+    """Open files; return their reader, and the ROS of their messages."""
     from rosbags.highlevel import AnyReader
+    from rosbags.rosbag2 import Reader
+    from rosbags.rosbag2.reader import DirectoryReader
     from rosbags.typesys import Stores, get_typestore
+
+    from webmap.bags.mcap_file import McapFile
 
     # Bags of ROS 2 hold the definitions of their types only since Iron.
     default = Stores.ROS1_NOETIC if dialect == "ros1" else Stores.ROS2_HUMBLE
     try:
         reader = AnyReader([*paths], default_typestore=get_typestore(default))
+        for each in reader.readers:
+            if isinstance(each, Reader) and isinstance(each.storage, DirectoryReader):
+                each.storage.STORAGE_PLUGINS = {
+                    **each.storage.STORAGE_PLUGINS,
+                    "mcap": McapFile,
+                }
+            elif isinstance(each, Reader) and each.path.suffix == ".mcap":
+                each.storage = McapFile(each.path)
         reader.open()
     except Exception as error:
         raise unreadable(paths, error) from None
-    return reader
+    if any(file.dialect == "ros1" for file in _mcap_files(reader)):
+        dialect, reader.is2 = "ros1", False
+    return reader, dialect
+
+
+def _mcap_files(reader: "AnyReader") -> "list[McapFile]":
+    from rosbags.rosbag2 import Reader
+
+    from webmap.bags.mcap_file import McapFile
+
+    found: list[object] = []
+    for each in reader.readers:
+        if isinstance(each, Reader):
+            found += [each.storage, *getattr(each.storage, "storages", ())]
+    return [storage for storage in found if isinstance(storage, McapFile)]
+
+
+def _why_unreadable(connection: "Connection") -> str | None:
+    """Return why the messages of a topic cannot be decoded, if they cannot."""
+    from webmap.bags.mcap_file import McapFile
+
+    owner = connection.owner
+    return owner.unreadable.get(connection.id) if isinstance(owner, McapFile) else None
+
+
+def _is_json(connection: "Connection") -> bool:
+    from rosbags.interfaces import ConnectionExtRosbag2
+
+    ext = connection.ext
+    return isinstance(ext, ConnectionExtRosbag2) and ext.serialization_format == "json"
 
 
 def _add_defaults(reader: "AnyReader", dialect: DialectName) -> None:
