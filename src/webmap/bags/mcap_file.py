@@ -207,7 +207,9 @@ class McapFile:
                 if inner == Opcode.MESSAGE:
                     yield record
         if not found:
-            raise Unreadable(f"at byte {part.at} is no chunk, although the index lists it")
+            raise Unreadable(
+                f"at byte {part.at} is no chunk, although the index lists it"
+            )
 
     def _inside(self, kind: int, at: int, data: bytes) -> Iterator[tuple[int, bytes]]:
         """Yield the records in a chunk; of any other record, the record itself."""
