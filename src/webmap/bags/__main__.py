@@ -5,6 +5,7 @@ import asyncio
 import logging
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from webmap.bags import need_rosbags
 from webmap.bags.player import Player
@@ -17,6 +18,9 @@ from webmap.ros.rosbridge.server.dialect import POLITE
 from webmap.ros.rosbridge.server.encode import Encoder
 from webmap.ros.rosbridge.server.server import RosbridgeServer
 from webmap.sim.process import signals_set
+
+if TYPE_CHECKING:
+    from webmap.bags.foxglove_server import FoxgloveServer
 
 log = logging.getLogger("webmap.bags")
 
@@ -49,6 +53,7 @@ async def _run(
     start: float,
     loop: bool,
     port: int,
+    foxglove_port: int | None,
     with_parent: bool,
 ) -> None:
     need_rosbags()
@@ -70,7 +75,8 @@ async def _run(
             lambda: running.call_soon_threadsafe(stop.set),
             lambda data: running.call_soon_threadsafe(hear, data),
         )
-    recording = Recording(paths, warn=log.warning)
+    served = foxglove_port is not None
+    recording = Recording(paths, warn=log.warning, undecoded=served)
     try:
         player = Player(recording, rate=rate, start=start, loop=loop)
         player.replay.start()
@@ -80,6 +86,9 @@ async def _run(
                 url = await server.start(HOST, port)
             except OSError as error:
                 raise ConfigError(why_not_listening(HOST, port, error)) from error
+            if foxglove_port is not None:
+                player.foxglove = _serve_foxglove(recording, player, foxglove_port)
+                url += f" {player.foxglove.url}"
             print(f"{READY}{url}", flush=True)
             playing = asyncio.create_task(player.run())
             stopped = asyncio.create_task(stop.wait())
@@ -94,8 +103,18 @@ async def _run(
                 stopped.cancel()
                 await asyncio.wait([playing, stopped])
                 await server.stop()
+                if player.foxglove is not None:
+                    player.foxglove.stop()
     finally:
         recording.close()
+
+
+def _serve_foxglove(
+    recording: Recording, player: Player, port: int
+) -> "FoxgloveServer":
+    from webmap.bags.foxglove_server import FoxgloveServer
+
+    return FoxgloveServer(recording, HOST, port, player.obey, lambda: player.status)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -108,6 +127,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--start", type=float, default=0.0, help="where it begins, in seconds")
     add("--loop", action="store_true", help="start again when the recording ends")
     add("--port", type=int, default=0, help="rosbridge port; 0 lets the system choose")
+    add("--foxglove-port", type=int, help="also serve Foxglove at this port")
     add("--with-parent", action="store_true", help="end when standard input does")
     return parser
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from webmap.bags.times import SECOND
 from webmap.bags.types import MessageConverter, bytes_of_json, texts_of
@@ -112,6 +112,7 @@ class Recording:
     Args:
         paths: Files (``.bag``, ``.mcap``, ``.db3``), or the folder of a bag of ROS 2.
         warn: Called with a sentence about each part that is left out.
+        undecoded: Whether :meth:`messages` includes the topics that cannot be decoded.
 
     Raises:
         ConfigError: If there is no such file, or it cannot be read.
@@ -119,7 +120,11 @@ class Recording:
     """
 
     def __init__(
-        self, paths: Sequence[Path], *, warn: Callable[[str], object] = lambda _: None
+        self,
+        paths: Sequence[Path],
+        *,
+        warn: Callable[[str], object] = lambda _: None,
+        undecoded: bool = False,
     ) -> None:
         self.paths = tuple(paths)
         """Its files or its folder."""
@@ -139,6 +144,9 @@ class Recording:
             self.topics: dict[str, RecordedTopic] = {}
             self._names: dict[str, str] = {}
             self._connections = self._usable()
+            self.connections = self._all_named() if undecoded else self._connections
+            """The topics in the files with messages in :meth:`messages`, as rosbags
+            describes them."""
         except ConfigError:
             self.close()
             raise
@@ -168,7 +176,17 @@ class Recording:
             ConfigError: If the file is damaged there.
 
         """
-        return self._read(self._connections, start, None)
+        return self._read(self.connections, start, None)
+
+    def definition(self, connection: "Connection") -> str:
+        """Return the definition of a topic's type, with those of its parts."""
+        if connection.msgdef.data:
+            return connection.msgdef.data
+        release: Literal[1, 2] = 1 if self.dialect == "ros1" else 2
+        text, _ = self._reader.typestore.generate_msgdef(
+            connection.msgtype, ros_version=release
+        )
+        return text
 
     def messages_of(self, wants: Callable[[str, str], bool]) -> Iterator[Recorded]:
         """Yield all messages of some topics, in order.
@@ -309,6 +327,17 @@ class Recording:
         if not usable:
             raise ConfigError(f"{self.name}: none of its topics can be played")
         return usable
+
+    def _all_named(self) -> "list[Connection]":
+        """Return all connections but further types of a topic that is played."""
+        rest = [
+            connection
+            for connection in self._reader.connections
+            if connection not in self._connections
+            and self._names.setdefault(connection.topic, connection.topic)
+            not in self.topics
+        ]
+        return self._connections + rest
 
     def _warn_of_cut_files(self) -> None:
         """Report each file that ends too early; it is played up to there."""
