@@ -296,6 +296,20 @@ def test_messages_whose_times_overlap_too_much_are_refused(tmp_path, monkeypatch
     recording.close()
 
 
+@pytest.mark.parametrize("qos", ["- [", "text", "- history: 3"])
+def test_a_topic_with_an_invalid_quality_of_service_is_read(tmp_path, qos):
+    path = tmp_path / "qos.mcap"
+    metadata = {"offered_qos_profiles": qos}
+    channel = Channel(
+        id=1, topic="/odom", message_encoding="cdr", metadata=metadata, schema_id=1
+    )
+    records = record(SCHEMA, channel, WHOLE[2], Footer(0, 0, 0))
+    path.write_bytes(HEAD + records + MAGIC)
+    recording = opened(path)
+    assert xs(recording) == [7.0]
+    recording.close()
+
+
 def test_a_file_without_any_definition_is_refused(tmp_path):
     path = tmp_path / "bare.mcap"
     path.write_bytes(

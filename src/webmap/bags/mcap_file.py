@@ -52,20 +52,17 @@ ASIDE = 400
 LOOSE = 1 << 20
 """Bytes after which messages outside of chunks begin another part."""
 
-FORMATS = {
-    "ros2msg": MessageDefinitionFormat.MSG,
-    "ros1msg": MessageDefinitionFormat.MSG,
-    "ros2idl": MessageDefinitionFormat.IDL,
-    "omgidl": MessageDefinitionFormat.IDL,
-    "": MessageDefinitionFormat.NONE,
-}
-"""The encodings of definitions; one that ``ros2 bag`` does not know is empty."""
+_MSG, _IDL = MessageDefinitionFormat.MSG, MessageDefinitionFormat.IDL
+_NO_TEXT = MessageDefinitionFormat.NONE
 
-ENCODINGS = {
-    **dict.fromkeys(("ros2msg", "ros2idl", "omgidl", ""), ("cdr", "json")),
-    "ros1msg": ("ros1", "json"),
+LANGUAGES = {
+    "ros2msg": (_MSG, ("cdr", "json")),
+    "ros2idl": (_IDL, ("cdr", "json")),
+    "omgidl": (_IDL, ("cdr", "json")),
+    "ros1msg": (_MSG, ("ros1", "json")),
+    "": (_NO_TEXT, ("cdr",)),  # a type that ``ros2 bag`` found no definition of
 }
-"""The encodings of messages that WebMap reads, by the encoding of the definition."""
+"""The languages of definitions, with the encodings of messages that WebMap reads."""
 
 _HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
@@ -344,21 +341,17 @@ class McapFile:
                 message_count=len(self._parts),  # at least
             )
         self._parts.sort()
-        schemas = {each.id: self.schemas.get(each.schema_id) for each in self._all()}
-        ros1 = {
-            each.id
-            for each in self._all()
-            if (schema := schemas[each.id]) and schema.encoding == "ros1msg"
-        }
-        cdr = any(each.message_encoding == "cdr" for each in self._all())
+        channels = self.channels.values()
+        ros1 = {one.id for one in self.schemas.values() if one.encoding == "ros1msg"}
+        cdr = any(channel.message_encoding == "cdr" for channel in channels)
         self.dialect = "ros1" if ros1 and not cdr else "ros2"
         defined: set[int] = set()  # rosbags needs each definition once
-        for channel in self._all():
-            schema = schemas[channel.id]
+        for channel in channels:
+            schema = self.schemas.get(channel.schema_id)
             type_name = schema.name if schema else "no type"
-            definition = MessageDefinition(MessageDefinitionFormat.NONE, "")
+            definition = MessageDefinition(_NO_TEXT, "")
             try:
-                if channel.id in ros1 and cdr:
+                if channel.schema_id in ros1 and cdr:
                     raise Unreadable("it is of ROS 1, and other topics are of ROS 2")
                 type_name = _type_of(channel, schema)
                 if schema and schema.id not in defined:
@@ -366,7 +359,10 @@ class McapFile:
                     defined.add(schema.id)
             except (ConfigError, Unreadable) as error:
                 self.unreadable[channel.id] = str(error)
-            qos = parse_qos(channel.metadata.get("offered_qos_profiles", ""))
+            try:
+                qos = parse_qos(channel.metadata.get("offered_qos_profiles", ""))
+            except Exception:  # names and types tell which topics latch, too
+                qos = []
             self.connections.append(
                 Connection(
                     channel.id,
@@ -380,9 +376,6 @@ class McapFile:
                 )
             )
 
-    def _all(self) -> Collection[Channel]:
-        return self.channels.values()
-
 
 def _type_of(channel: Channel, schema: Schema | None) -> str:
     """Return the name of a channel's type, as in ROS 2.
@@ -394,7 +387,8 @@ def _type_of(channel: Channel, schema: Schema | None) -> str:
     """
     if schema is None:
         raise Unreadable("the file has no definition of its type")
-    if channel.message_encoding not in ENCODINGS.get(schema.encoding, ()):
+    _, readable = LANGUAGES.get(schema.encoding, (_NO_TEXT, ()))
+    if channel.message_encoding not in readable:
         raise Unreadable(
             f"its messages are encoded as {one_line(channel.message_encoding)} and its "
             f"type as {one_line(schema.encoding)}; WebMap reads messages as cdr, ros1 "
@@ -411,16 +405,16 @@ def _definition_of(schema: Schema, type_name: str) -> MessageDefinition:
         Unreadable: If it is not valid.
 
     """
-    definition = FORMATS[schema.encoding]
+    language, _ = LANGUAGES[schema.encoding]
     try:
         text = schema.data.decode()
-        if definition == MessageDefinitionFormat.MSG:
+        if language == _MSG:
             get_types_from_msg(text, type_name)
-        elif definition == MessageDefinitionFormat.IDL and not text.startswith("="):
+        elif language == _IDL and not text.startswith("="):
             get_types_from_idl(text)
     except Exception as error:
         raise Unreadable(f"its definition is not valid: {one_line(error)}") from None
-    return MessageDefinition(definition, text)
+    return MessageDefinition(language, text)
 
 
 def _decompressed(chunk: Chunk) -> bytes:

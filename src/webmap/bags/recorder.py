@@ -251,6 +251,21 @@ class Recorder:
             why = f"messages that do not fit the type {track.type} are not recorded"
             self.drop(topic, why, str(error))
             return
+        self.take_bytes(topic, data, time)
+
+    def take_bytes(self, topic: str, data: bytes, time: int) -> None:
+        """Write a serialized message of an added topic as it is, without a check.
+
+        Args:
+            topic: The name of the topic.
+            data: The bytes: CDR in a bag of ROS 2, else as ROS 1 sends them.
+            time: Its time of arrival, in nanoseconds since 1970.
+
+        Raises:
+            OSError: If the file cannot be written.
+
+        """
+        track = self._tracks[topic]
         if track.channel is None:
             track.channel = self._bag.add(topic, track.version)
         self._bag.write(track.channel, time, data)
