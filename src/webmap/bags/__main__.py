@@ -5,7 +5,6 @@ import asyncio
 import logging
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from webmap.bags import need_rosbags
 from webmap.bags.player import Player
@@ -18,9 +17,6 @@ from webmap.ros.rosbridge.server.dialect import POLITE
 from webmap.ros.rosbridge.server.encode import Encoder
 from webmap.ros.rosbridge.server.server import RosbridgeServer
 from webmap.sim.process import signals_set
-
-if TYPE_CHECKING:
-    from webmap.bags.foxglove_server import FoxgloveServer
 
 log = logging.getLogger("webmap.bags")
 
@@ -75,8 +71,7 @@ async def _run(
             lambda: running.call_soon_threadsafe(stop.set),
             lambda data: running.call_soon_threadsafe(hear, data),
         )
-    served = foxglove_port is not None
-    recording = Recording(paths, warn=log.warning, undecoded=served)
+    recording = Recording(paths, warn=log.warning, undecoded=foxglove_port is not None)
     try:
         player = Player(recording, rate=rate, start=start, loop=loop)
         player.replay.start()
@@ -87,7 +82,12 @@ async def _run(
             except OSError as error:
                 raise ConfigError(why_not_listening(HOST, port, error)) from error
             if foxglove_port is not None:
-                player.foxglove = _serve_foxglove(recording, player, foxglove_port)
+                from webmap.bags.foxglove_server import FoxgloveServer
+
+                logging.getLogger("foxglove").setLevel(logging.WARNING)
+                player.foxglove = FoxgloveServer(
+                    recording, HOST, foxglove_port, player.obey, lambda: player.status
+                )
                 url += f" {player.foxglove.url}"
             print(f"{READY}{url}", flush=True)
             playing = asyncio.create_task(player.run())
@@ -107,14 +107,6 @@ async def _run(
                     player.foxglove.stop()
     finally:
         recording.close()
-
-
-def _serve_foxglove(
-    recording: Recording, player: Player, port: int
-) -> "FoxgloveServer":
-    from webmap.bags.foxglove_server import FoxgloveServer
-
-    return FoxgloveServer(recording, HOST, port, player.obey, lambda: player.status)
 
 
 def _parser() -> argparse.ArgumentParser:
