@@ -1,6 +1,9 @@
 """MCAP files of other writers, files that were cut off, and damaged ones."""
 
+import signal
 import struct
+import subprocess
+import sys
 import tracemalloc
 import zlib
 
@@ -9,7 +12,7 @@ import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.records import Channel, Chunk, ChunkIndex, Footer, Header, Message, Schema
 
-from equipment.bag_files import BEGIN, ODOMETRY, Made
+from equipment.bag_files import BEGIN, ODOMETRY, Made, types_of
 from equipment.mcap_files import LOOSE, MCAPCompression, definition, odometry, write
 from webmap.bags import mcap_file
 from webmap.bags.mcap_file import MAGIC
@@ -134,6 +137,50 @@ def test_a_file_that_was_cut_off_is_read_up_to_there(tmp_path, options, share):
     (warning,) = warnings
     assert warning.startswith("short.mcap is played only up to where it can be read")
     assert "`mcap recover`" in warning
+    recording.close()
+
+
+def test_of_a_recorder_that_was_killed_all_but_the_last_chunk_is_read(tmp_path):
+    made, version = Made("ros2"), next(types_of("ros2").versions(ODOMETRY))
+    data = version.bytes_of(made.odometry(0.0, 1.0))
+    number = 2 * (1 << 20) // len(data) + 100
+    script = (
+        "import os, sys\n"
+        "from pathlib import Path\n"
+        "from webmap.bags.recorder import new_bag\n"
+        "from webmap.bags.types import Types\n"
+        "version = next(Types('ros2').versions('nav_msgs/Odometry'))\n"
+        "bag = new_bag(Path(sys.argv[1]), 'ros2')\n"
+        "channel = bag.add('/odom', version)\n"
+        "data = bytes.fromhex(sys.argv[2])\n"
+        "for number in range(int(sys.argv[3])):\n"
+        "    bag.write(channel, 10**18 + number, data)\n"
+        "bag._writer.storage.bio.flush()\n"  # as the system does after a while
+        "os.kill(os.getpid(), 9)\n"
+    )
+    command = [sys.executable, "-c", script, tmp_path / "bag", data.hex(), str(number)]
+    assert subprocess.run(command, check=False).returncode == -signal.SIGKILL
+    warnings = []
+    recording = opened(tmp_path / "bag" / "bag.mcap", warnings)
+    read = sum(1 for _ in recording.messages(0))
+    assert number - (1 << 20) // len(data) - 100 < read < number
+    assert "it was not closed; `mcap recover`" in warnings[0]
+    recording.close()
+
+
+def test_the_file_in_the_folder_of_a_bag_is_read_with_the_same_checks(tmp_path):
+    made = Made("ros2")
+    bag = made.bag(tmp_path / "bag", ("/odom", ODOMETRY, 0.0, made.odometry(0.0, 1.0)))
+    file = bag / "bag.mcap"
+    data = bytearray(file.read_bytes())
+    at = data.index(b"zstd") + 100
+    data[at : at + 50] = bytes(50)
+    file.write_bytes(data)
+    recording = opened(bag)
+    with pytest.raises(
+        ConfigError, match=r"bag cannot be read.*: the chunk at byte \d+"
+    ):
+        list(recording.messages(BEGIN))
     recording.close()
 
 
