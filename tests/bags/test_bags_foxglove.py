@@ -105,7 +105,7 @@ def test_the_server_has_the_times_of_the_recording_and_accepts_no_commands(file)
 def test_foxglove_pauses_seeks_and_changes_the_speed_for_the_page_too(file):
     async def story():
         async with served(file, rate=0.001) as (player, page, client):
-            await client.subscribe("/odom", "/map")
+            await client.subscribe("/odom", "/map", "/scene")
             seek = BEGIN + 2 * SECOND
             await client.control(play=False, speed=2.0, seek=seek, request="one")
             await until(lambda: client.states and client.states[-1][-1] == "one")
@@ -116,6 +116,7 @@ def test_foxglove_pauses_seeks_and_changes_the_speed_for_the_page_too(file):
             await until(lambda: client.received("/odom"))
             assert client.received("/odom")[-1][0] == seek
             assert client.received("/map")[-1][0] == BEGIN
+            assert client.received("/scene")[-1] == (BEGIN + SECOND // 2, b"\x00\xff")
             await client.control(play=True, speed=1000.0, request="two")
             await until(lambda: player.status.ended)
             await until(lambda: client.states[-1][0] == "ended")
@@ -200,6 +201,26 @@ def test_bags_of_both_versions_of_ros_are_served(made, tmp_path):
             keys = "encoding", "schemaEncoding", "schemaName"
             assert tuple(odom[key] for key in keys) == expected[made.dialect]
             assert "geometry_msgs/PoseWithCovariance pose" in odom["schema"]
+
+    asyncio.run(story())
+
+
+def test_a_topic_without_a_definition_gets_the_usual_one_or_none(tmp_path):
+    bare = ("cdr", "")
+    data = odometry(1.0, 1.0)[-1]
+    path = write(
+        tmp_path / "bare.mcap",
+        ("/odom", bare, "nav_msgs/msg/Odometry", b"", 0.0, data),
+        ("/arm", bare, "acme_msgs/msg/Arm", b"", 0.0, b"\0\1\0\0\0"),
+    )
+
+    async def story():
+        async with served(path) as (_, __, client):
+            await client.subscribe("/odom", "/arm")
+            assert client.channels["/arm"]["schema"] == ""
+            schema = client.channels["/odom"]["schema"]
+            assert "geometry_msgs/PoseWithCovariance pose" in schema
+            await until(lambda: client.received("/arm"))
 
     asyncio.run(story())
 

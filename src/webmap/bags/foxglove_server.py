@@ -1,7 +1,6 @@
 """A recording for Foxglove and Lichtblick, with the bytes that were recorded."""
 
 import asyncio
-import math
 from collections import deque
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
@@ -115,17 +114,14 @@ class FoxgloveServer(ServerListener):
         if abs(recorded.time - self._time) >= TICK * rate * SECOND:
             self._time = recorded.time
             self._server.broadcast_time(recorded.time)
-        if recorded.topic in self._kept:
-            self._kept[recorded.topic].append(recorded)
-        self._log(recorded)
+        self._keep_and_log(recorded)
 
     def send_state(self, state: Iterable[Recorded]) -> None:
         """Send the state at a position, if the position jumped there."""
         if self._needs_state:
             self._needs_state = False
             for recorded in state:
-                self._time = recorded.time  # its time is before the position
-                self.send(recorded, math.inf)
+                self._keep_and_log(recorded)
 
     def show(self, status: Status) -> None:
         """Send the position, and the state of the playback if it changed."""
@@ -178,6 +174,11 @@ class FoxgloveServer(ServerListener):
         self._obey(command)
         self._request = request
         self.show(self._status())
+
+    def _keep_and_log(self, recorded: Recorded) -> None:
+        if recorded.topic in self._kept:
+            self._kept[recorded.topic].append(recorded)
+        self._log(recorded)
 
     def _log(self, recorded: Recorded) -> None:
         channel = self._channels[_key(recorded.connection)]

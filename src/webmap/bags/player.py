@@ -332,9 +332,10 @@ class Player:
             return
         playback.begin(self._now())
         soonest = self._now() + round(ROUND * SECOND)
-        self.replay.publish_state(state, playback.pace(self._now()))
         if self.foxglove is not None:
             self.foxglove.send_state(state)
+            state = [one for one in state if one.topic in self._recording.topics]
+        self.replay.publish_state(state, playback.pace(self._now()))
         self._shown.set()
         if not playback.playing:
             await self._hold(turn, state)

@@ -112,7 +112,8 @@ class Recording:
     Args:
         paths: Files (``.bag``, ``.mcap``, ``.db3``), or the folder of a bag of ROS 2.
         warn: Called with a sentence about each part that is left out.
-        undecoded: Whether :meth:`messages` includes the topics that cannot be decoded.
+        undecoded: Whether :meth:`messages` and :meth:`state_at` include the topics that
+            cannot be decoded.
 
     Raises:
         ConfigError: If there is no such file, or it cannot be read.
@@ -178,15 +179,20 @@ class Recording:
         """
         return self._read(self.connections, start, None)
 
+    def _topic(self, name: str) -> RecordedTopic:
+        return self.topics.get(name) or RecordedTopic(name, "", False)
+
     def definition(self, connection: "Connection") -> str:
-        """Return the definition of a topic's type, with those of its parts."""
+        """Return the definition of a topic's type and its parts; empty if unknown."""
         if connection.msgdef.data:
             return connection.msgdef.data
         release: Literal[1, 2] = 1 if self.dialect == "ros1" else 2
-        text, _ = self._reader.typestore.generate_msgdef(
-            connection.msgtype, ros_version=release
-        )
-        return text
+        try:
+            return self._reader.typestore.generate_msgdef(
+                connection.msgtype, ros_version=release
+            )[0]
+        except Exception:
+            return ""
 
     def messages_of(self, wants: Callable[[str, str], bool]) -> Iterator[Recorded]:
         """Yield all messages of some topics, in order.
@@ -223,7 +229,7 @@ class Recording:
             ConfigError: If the file is damaged before that time.
 
         """
-        static = [c for c in self._connections if is_static(self._names[c.topic])]
+        static = [c for c in self.connections if is_static(self._names[c.topic])]
         found: list[Recorded] = []
         for recorded in self._read(static, None, time + 1) if static else ():
             if not go_on():
@@ -231,9 +237,9 @@ class Recording:
             found.append(recorded)
         rest = [
             connection
-            for connection in self._connections
+            for connection in self.connections
             if connection not in static
-            and self.topics[self._names[connection.topic]].type not in LOGS
+            and self._topic(self._names[connection.topic]).type not in LOGS
         ]
         end, span, newest = time + 1, RECENT, dict[str, Recorded]()
         # Each further look back is longer, and only for topics without a message yet.
@@ -244,7 +250,7 @@ class Recording:
                 if not go_on():
                     return found
                 latest[recorded.topic] = recorded
-                if self.topics[recorded.topic].type == FRAMES:
+                if self._topic(recorded.topic).type == FRAMES:
                     found.append(recorded)
             newest |= latest
             end, span = begin, span * 4
@@ -252,10 +258,10 @@ class Recording:
                 connection
                 for connection in rest
                 if (name := self._names[connection.topic]) not in newest
-                and (self.topics[name].latched or time - end < LONGEST_LOOK)
+                and (self._topic(name).latched or time - end < LONGEST_LOOK)
             ]
         found += [
-            one for one in newest.values() if self.topics[one.topic].type != FRAMES
+            one for one in newest.values() if self._topic(one.topic).type != FRAMES
         ]
         return sorted(found, key=lambda one: one.time)
 
