@@ -9,7 +9,8 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 
 from equipment.bag_files import BEGIN, FRAMES, GRID, ODOMETRY, TWIST, Made, types_of
-from webmap.bags.recording import Recording, recording_name
+from webmap.bags.files import recording_name
+from webmap.bags.recording import Recording
 from webmap.base.errors import ConfigError
 
 

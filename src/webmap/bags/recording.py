@@ -5,19 +5,28 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+from webmap.bags.files import (
+    add_defaults,
+    dialect_of,
+    is_json,
+    is_latched_in_file,
+    mcap_files,
+    opened,
+    reason,
+    recording_name,
+    unreadable,
+    why_unreadable,
+)
 from webmap.bags.times import SECOND
 from webmap.bags.types import MessageConverter, bytes_of_json, texts_of
 from webmap.base.errors import ConfigError
-from webmap.base.plain_files import refuse_special, resolved
 from webmap.ros.definitions import Definitions, UnknownType
-from webmap.ros.rosbridge.server.dialect import Dialect, DialectName, canonical, resolve
+from webmap.ros.rosbridge.server.dialect import Dialect, canonical, resolve
 from webmap.ros.rosbridge.server.schema import Schema
 
 if TYPE_CHECKING:
-    from rosbags.highlevel import AnyReader
     from rosbags.interfaces import Connection
 
-    from webmap.bags.mcap_file import McapFile
 
 NAMES = ("map", "tf_static", "robot_description")
 """Names of topics that latch, even if the bag does not mark them so."""
@@ -71,13 +80,6 @@ LOGS = ("rosgraph_msgs/Log", "rcl_interfaces/Log")
 """Types of log lines, which are events and no state."""
 
 FRAMES = "tf2_msgs/TFMessage"
-
-ROS1, ROS2 = ".bag", (".mcap", ".db3")
-
-METADATA = "metadata.yaml"
-
-LARGEST_METADATA = 4 << 20
-"""Most bytes of the description of a bag, which is read as a whole."""
 
 
 class Recorded(NamedTuple):
@@ -134,7 +136,7 @@ class Recording:
         self._warn = warn
         self._failed: set[str] = set()
         self._closed = False
-        self._reader, self.dialect = _opened(paths, _dialect(paths))
+        self._reader, self.dialect = opened(paths, dialect_of(paths))
         try:
             self._warn_of_cut_files()
             self.begin = self._reader.start_time
@@ -272,7 +274,7 @@ class Recording:
         """
         try:
             type_name, data = self.topics[recorded.topic].type, recorded.data
-            if _is_json(recorded.connection):
+            if is_json(recorded.connection):
                 fields = self.schema.fields(type_name)
                 data = bytes_of_json(fields, data, ros2=self.dialect == "ros2")
             value = self._reader.deserialize(data, recorded.connection.msgtype)
@@ -283,7 +285,7 @@ class Recording:
                 self._warn(
                     f"{self.name}: messages of {recorded.topic} that are not of the "
                     f"type {recorded.connection.msgtype} are not played "
-                    f"({_reason(error)})"
+                    f"({reason(error)})"
                 )
             return None
 
@@ -303,10 +305,10 @@ class Recording:
         """Return the connections that can be played; register topics and types."""
         if self._reader.message_count == 0:
             raise ConfigError(f"{self.name}: it contains no message")
-        _add_defaults(self._reader, self.dialect)
+        add_defaults(self._reader, self.dialect)
         usable = []
         for connection in self._reader.connections:
-            if why := _why_unreadable(connection):
+            if why := why_unreadable(connection):
                 self._leave_out(connection, why)
                 continue
             try:
@@ -324,7 +326,7 @@ class Recording:
                 self._leave_out(connection, f"it is a {known.type} too")
                 continue
             self.schema.define(texts)
-            latched = (known is not None and known.latched) or _is_latched_in_file(
+            latched = (known is not None and known.latched) or is_latched_in_file(
                 connection
             )
             latched = latched or is_latched(name, type_name)
@@ -347,7 +349,7 @@ class Recording:
 
     def _warn_of_cut_files(self) -> None:
         """Report each file that ends too early; it is played up to there."""
-        for file in _mcap_files(self._reader):
+        for file in mcap_files(self._reader):
             if file.cut:
                 self._warn(
                     f"{self.name} is played only up to where it can be read: "
@@ -358,156 +360,3 @@ class Recording:
         self._warn(
             f"{self.name}: {connection.topic} ({connection.msgtype}) is left out: {why}"
         )
-
-
-def recording_name(paths: Sequence[Path]) -> str:
-    """Return the name of a recording: its file, and the number of further files."""
-    first = resolved(paths[0]).name or str(paths[0])
-    return first if len(paths) == 1 else f"{first} and {len(paths) - 1} more"
-
-
-def unreadable(paths: Sequence[Path], error: Exception) -> ConfigError:
-    """Return the error for a recording that cannot be read, with tools for a repair."""
-    text = f"{recording_name(paths)} cannot be read as a recording: {_reason(error)}"
-    if not isinstance(error, OSError):  # the system did not refuse to read it
-        text += f"; {_repair(paths)}"
-    return ConfigError(text)
-
-
-def _repair(paths: Sequence[Path]) -> str:
-    """Return which tools may repair a damaged recording."""
-    files = [each for path in paths for each in (path, *path.glob("*"))]
-    suffixes = {file.suffix for file in files if not file.is_dir()}
-    if ROS1 in suffixes:
-        return "if the file was not closed, `rosbag reindex` repairs it"
-    folder = "`ros2 bag reindex` repairs the metadata.yaml of its folder"
-    if ".mcap" in suffixes:
-        return f"if the file was not closed, `mcap recover` repairs it, and {folder}"
-    return f"`sqlite3 FILE .recover` reads what is left of a .db3 file, and {folder}"
-
-
-def _reason(error: Exception) -> str:
-    """Return why a file could not be read, for people."""
-    text = str(error).strip().partition("\n")[0].rstrip(".")
-    if not text or isinstance(error, AssertionError | LookupError | TypeError):
-        return "it is damaged or cut off"
-    return text[:200]
-
-
-def _dialect(paths: Sequence[Path]) -> DialectName:
-    kinds: set[DialectName] = set()
-    for path in paths:
-        if not path.exists():
-            raise ConfigError(f"{path}: there is no such file or folder")
-        _refuse_endless(path)
-        if path.is_dir() and not (path / METADATA).exists():
-            raise ConfigError(
-                f"{path}: there is no metadata.yaml in this folder, so it is not a bag "
-                f"of ROS 2; give the .mcap or .db3 file in it instead, or write the "
-                f"metadata.yaml with `ros2 bag reindex`"
-            )
-        if path.is_file() and path.suffix not in (ROS1, *ROS2):
-            raise ConfigError(
-                f"{path} is not the name of a recording; expected .bag, .mcap, .db3, "
-                f"or the folder of a bag of ROS 2"
-            )
-        kinds.add("ros1" if path.suffix == ROS1 and path.is_file() else "ros2")
-    if len(kinds) > 1:
-        raise ConfigError("bags of ROS 1 and of ROS 2 cannot be played as one")
-    return kinds.pop()
-
-
-def _refuse_endless(path: Path) -> None:
-    """Refuse files on which a reader would block for ever."""
-    refuse_special(path)
-    if not path.is_dir():
-        return
-    for entry in path.iterdir():
-        if entry.exists():  # a dangling link is left to the reader
-            refuse_special(entry)
-    about = path / METADATA
-    size = about.stat().st_size if about.is_file() else 0
-    if size > LARGEST_METADATA:
-        raise ConfigError(
-            f"{about}: got {size} bytes, expected at most {LARGEST_METADATA} for the "
-            f"description of a bag"
-        )
-
-
-def _opened(
-    paths: Sequence[Path], dialect: DialectName
-) -> "tuple[AnyReader, DialectName]":
-    """Open files; return their reader, and the ROS of their messages."""
-    from rosbags.highlevel import AnyReader
-    from rosbags.rosbag2 import Reader
-    from rosbags.rosbag2.reader import DirectoryReader
-    from rosbags.typesys import Stores, get_typestore
-
-    from webmap.bags.mcap_file import McapFile
-
-    # Bags of ROS 2 hold the definitions of their types only since Iron.
-    default = Stores.ROS1_NOETIC if dialect == "ros1" else Stores.ROS2_HUMBLE
-    try:
-        reader = AnyReader([*paths], default_typestore=get_typestore(default))
-        for each in reader.readers:
-            if isinstance(each, Reader) and isinstance(each.storage, DirectoryReader):
-                each.storage.STORAGE_PLUGINS = {
-                    **each.storage.STORAGE_PLUGINS,
-                    "mcap": McapFile,
-                }
-            elif isinstance(each, Reader) and each.path.suffix == ".mcap":
-                each.storage = McapFile(each.path)
-        reader.open()
-    except Exception as error:
-        raise unreadable(paths, error) from None
-    if any(file.dialect == "ros1" for file in _mcap_files(reader)):
-        dialect, reader.is2 = "ros1", False
-    return reader, dialect
-
-
-def _mcap_files(reader: "AnyReader") -> "list[McapFile]":
-    from rosbags.rosbag2 import Reader
-
-    from webmap.bags.mcap_file import McapFile
-
-    found: list[object] = []
-    for each in reader.readers:
-        if isinstance(each, Reader):
-            found += [each.storage, *getattr(each.storage, "storages", ())]
-    return [storage for storage in found if isinstance(storage, McapFile)]
-
-
-def _why_unreadable(connection: "Connection") -> str | None:
-    """Return why the messages of a topic cannot be decoded, if they cannot."""
-    from webmap.bags.mcap_file import McapFile
-
-    owner = connection.owner
-    return owner.unreadable.get(connection.id) if isinstance(owner, McapFile) else None
-
-
-def _is_json(connection: "Connection") -> bool:
-    from rosbags.interfaces import ConnectionExtRosbag2
-
-    ext = connection.ext
-    return isinstance(ext, ConnectionExtRosbag2) and ext.serialization_format == "json"
-
-
-def _add_defaults(reader: "AnyReader", dialect: DialectName) -> None:
-    """Add the common types that the file itself does not define to a reader."""
-    from rosbags.typesys import Stores, get_typestore
-
-    known = reader.typestore.fielddefs
-    if all(connection.msgtype in known for connection in reader.connections):
-        return
-    default = Stores.ROS1_NOETIC if dialect == "ros1" else Stores.ROS2_HUMBLE
-    usual = get_typestore(default).fielddefs
-    reader.typestore.register({n: usual[n] for n in usual if n not in known})
-
-
-def _is_latched_in_file(connection: "Connection") -> bool:
-    from rosbags.interfaces import ConnectionExtRosbag1, QosDurability
-
-    if isinstance(connection.ext, ConnectionExtRosbag1):
-        return bool(connection.ext.latching)
-    durable = QosDurability.TRANSIENT_LOCAL
-    return any(q.durability == durable for q in connection.ext.offered_qos_profiles)

@@ -79,7 +79,7 @@ def play(
     import webmap
     from webmap import console
     from webmap.bags import need_foxglove, need_rosbags
-    from webmap.bags.recording import recording_name
+    from webmap.bags.files import recording_name
     from webmap.features.player.recording_player import RecordingPlayer, expect_jumps
     from webmap.fleet.overrides import ViewOnly
     from webmap.fleet.search import find_fleet
