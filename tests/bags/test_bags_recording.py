@@ -9,7 +9,8 @@ from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as Writer2
 
 from equipment.bag_files import BEGIN, FRAMES, GRID, ODOMETRY, TWIST, Made, types_of
-from webmap.bags.recording import Recording, recording_name
+from webmap.bags.files import recording_name
+from webmap.bags.recording import Recording
 from webmap.base.errors import ConfigError
 
 
@@ -178,7 +179,7 @@ def test_a_too_large_metadata_file_is_refused(tmp_path):
     [
         ("empty.bag", ["rosbag reindex"]),
         ("empty.mcap", ["mcap recover", "ros2 bag reindex"]),
-        ("empty.db3", ["ros2 bag reindex"]),
+        ("empty.db3", ["sqlite3 FILE .recover", "ros2 bag reindex"]),
     ],
 )
 @pytest.mark.parametrize("by_folder", [False, True])
@@ -202,16 +203,30 @@ def test_a_file_that_the_system_does_not_open_has_no_tool(tmp_path, monkeypatch)
     assert refusal(tmp_path / "a.bag").endswith("Permission denied")
 
 
-@pytest.mark.parametrize("share", [0.2, 0.6, 0.95])
-def test_a_truncated_file_is_refused(made, bag, tmp_path, share):
-    whole = bag if bag.is_file() else bag / "office.mcap"
-    short = tmp_path / f"short{whole.suffix}"
+def cut(whole, share):
+    """Write the first part of a file to a new one; return it."""
+    short = whole.with_name(f"short{whole.suffix}")
     data = whole.read_bytes()
     short.write_bytes(data[: int(len(data) * share)])
+    return short
+
+
+@pytest.mark.parametrize("share", [0.05, 0.1])
+def test_a_file_that_is_cut_off_before_its_first_message_is_refused(made, bag, share):
+    short = cut(bag if bag.is_file() else bag / "office.mcap", share)
     error = refusal(short)
     assert error.startswith(f"{short.name} cannot be read as a recording: ")
     tool = "`rosbag reindex`" if made.dialect == "ros1" else "`mcap recover`"
     assert tool in error
+
+
+@pytest.mark.parametrize("share", [0.6, 0.95])
+def test_a_bag_of_ros_1_that_is_cut_off_is_refused(tmp_path, share):
+    made = Made("ros1")
+    odometry = ("/odom", ODOMETRY, 0.0, made.odometry(0.0, 1.0))
+    error = refusal(cut(made.bag(tmp_path / "office", odometry), share))
+    assert error.startswith("short.bag cannot be read as a recording: ")
+    assert "`rosbag reindex`" in error
 
 
 @pytest.mark.parametrize("name", ["noise.bag", "noise.mcap", "noise.db3"])

@@ -49,6 +49,7 @@ async def _run(
     start: float,
     loop: bool,
     port: int,
+    foxglove_port: int | None,
     with_parent: bool,
 ) -> None:
     need_rosbags()
@@ -70,7 +71,7 @@ async def _run(
             lambda: running.call_soon_threadsafe(stop.set),
             lambda data: running.call_soon_threadsafe(hear, data),
         )
-    recording = Recording(paths, warn=log.warning)
+    recording = Recording(paths, warn=log.warning, undecoded=foxglove_port is not None)
     try:
         player = Player(recording, rate=rate, start=start, loop=loop)
         player.replay.start()
@@ -80,6 +81,14 @@ async def _run(
                 url = await server.start(HOST, port)
             except OSError as error:
                 raise ConfigError(why_not_listening(HOST, port, error)) from error
+            if foxglove_port is not None:
+                from webmap.bags.foxglove_server import FoxgloveServer
+
+                logging.getLogger("foxglove").setLevel(logging.WARNING)
+                player.foxglove = FoxgloveServer(
+                    recording, HOST, foxglove_port, player.obey, lambda: player.status
+                )
+                url += f" {player.foxglove.url}"
             print(f"{READY}{url}", flush=True)
             playing = asyncio.create_task(player.run())
             stopped = asyncio.create_task(stop.wait())
@@ -94,6 +103,8 @@ async def _run(
                 stopped.cancel()
                 await asyncio.wait([playing, stopped])
                 await server.stop()
+                if player.foxglove is not None:
+                    player.foxglove.stop()
     finally:
         recording.close()
 
@@ -108,6 +119,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--start", type=float, default=0.0, help="where it begins, in seconds")
     add("--loop", action="store_true", help="start again when the recording ends")
     add("--port", type=int, default=0, help="rosbridge port; 0 lets the system choose")
+    add("--foxglove-port", type=int, help="also serve Foxglove at this port")
     add("--with-parent", action="store_true", help="end when standard input does")
     return parser
 

@@ -7,7 +7,7 @@ import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from webmap.bags.marks import find_marks
 from webmap.bags.playback import (
@@ -35,6 +35,9 @@ from webmap.ros.rosbridge.server.graph import (
 )
 from webmap.ros.rosbridge.server.rosapi import Rosapi
 from webmap.ros.rosbridge.server.schema import Schema
+
+if TYPE_CHECKING:
+    from webmap.bags.foxglove_server import FoxgloveServer
 
 log = logging.getLogger("webmap.bags")
 
@@ -256,6 +259,8 @@ class Player:
                 f"{recording.name} is {recording.seconds:.1f} s long, so it cannot be "
                 f"played from {start:g} s on"
             )
+        self.foxglove: FoxgloveServer | None = None
+        """Also gets what is played, if set before :meth:`run`."""
         self._now = now or steady_clock()
         self.replay = Replay(recording, clock=lambda: self._now() / SECOND)
         self._recording = recording
@@ -315,7 +320,7 @@ class Player:
                 jumps = self._playback.jumps
                 self._problem = ""
                 self.replay.forget()
-            self.replay.publish_status(self.status)  # first, as poses jump
+            self._show_status()  # first, as poses jump
             await self._take_turn(self._playback.turn)
 
     async def _take_turn(self, turn: int) -> None:
@@ -327,6 +332,9 @@ class Player:
             return
         playback.begin(self._now())
         soonest = self._now() + round(ROUND * SECOND)
+        if self.foxglove is not None:
+            self.foxglove.send_state(state)
+            state = [one for one in state if one.topic in self._recording.topics]
         self.replay.publish_state(state, playback.pace(self._now()))
         self._shown.set()
         if not playback.playing:
@@ -359,6 +367,8 @@ class Player:
             if not await self._until(turn, recorded.time):
                 return
             self.replay.publish(recorded, self._playback.pace(self._now()))
+            if self.foxglove is not None:
+                self.foxglove.send(recorded, self._playback.rate)
             self._last = recorded.time
 
     async def _finish(self, turn: int, soonest: int) -> None:
@@ -409,7 +419,7 @@ class Player:
         if not self._woken.is_set():
             return False
         self._woken.clear()
-        self.replay.publish_status(self.status)
+        self._show_status()
         return True
 
     async def _find_marks(self) -> None:
@@ -431,10 +441,16 @@ class Player:
             await asyncio.wait([running])  # the file is closed afterwards
             raise
 
+    def _show_status(self) -> None:
+        status = self.status
+        self.replay.publish_status(status)
+        if self.foxglove is not None:
+            self.foxglove.show(status)
+
     async def _publish_status(self) -> None:
         published: Marks | None = None
         while True:
-            self.replay.publish_status(self.status)
+            self._show_status()
             if self._marks is not published:
                 published = self._marks
                 self.replay.publish_marks(published)

@@ -106,16 +106,23 @@ class Ros2Bag:
     """A folder with an MCAP file and its description.
 
     MCAP holds the definitions of the types, and most of an unclosed file can be
-    recovered. rosbags writes sqlite3 as one transaction, of which nothing would remain.
+    recovered: all but the last chunk, which is a megabyte before its compression.
+    rosbags writes sqlite3 as one transaction, of which nothing would remain.
     """
 
     def __init__(self, path: Path) -> None:
-        from rosbags.rosbag2 import StoragePlugin, Writer
+        from rosbags.rosbag2 import (
+            CompressionFormat,
+            CompressionMode,
+            StoragePlugin,
+            Writer,
+        )
 
         self.path = path
         self._writer = Writer(
             path, version=METADATA_VERSION, storage_plugin=StoragePlugin.MCAP
         )
+        self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
         self._writer.open()
 
     def add(self, topic: str, version: TypeVersion) -> Any:
@@ -244,6 +251,21 @@ class Recorder:
             why = f"messages that do not fit the type {track.type} are not recorded"
             self.drop(topic, why, str(error))
             return
+        self.take_bytes(topic, data, time)
+
+    def take_bytes(self, topic: str, data: bytes, time: int) -> None:
+        """Write a serialized message of an added topic as it is, without a check.
+
+        Args:
+            topic: The name of the topic.
+            data: The bytes: CDR in a bag of ROS 2, else as ROS 1 sends them.
+            time: Its time of arrival, in nanoseconds since 1970.
+
+        Raises:
+            OSError: If the file cannot be written.
+
+        """
+        track = self._tracks[topic]
         if track.channel is None:
             track.channel = self._bag.add(topic, track.version)
         self._bag.write(track.channel, time, data)

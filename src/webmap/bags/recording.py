@@ -3,19 +3,30 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+from webmap.bags.files import (
+    add_defaults,
+    dialect_of,
+    is_json,
+    is_latched_in_file,
+    mcap_files,
+    opened,
+    reason,
+    recording_name,
+    unreadable,
+    why_unreadable,
+)
 from webmap.bags.times import SECOND
-from webmap.bags.types import MessageConverter, texts_of
+from webmap.bags.types import MessageConverter, bytes_of_json, texts_of
 from webmap.base.errors import ConfigError
-from webmap.base.plain_files import refuse_special, resolved
 from webmap.ros.definitions import Definitions, UnknownType
-from webmap.ros.rosbridge.server.dialect import Dialect, DialectName, canonical, resolve
+from webmap.ros.rosbridge.server.dialect import Dialect, canonical, resolve
 from webmap.ros.rosbridge.server.schema import Schema
 
 if TYPE_CHECKING:
-    from rosbags.highlevel import AnyReader
     from rosbags.interfaces import Connection
+
 
 NAMES = ("map", "tf_static", "robot_description")
 """Names of topics that latch, even if the bag does not mark them so."""
@@ -70,13 +81,6 @@ LOGS = ("rosgraph_msgs/Log", "rcl_interfaces/Log")
 
 FRAMES = "tf2_msgs/TFMessage"
 
-ROS1, ROS2 = ".bag", (".mcap", ".db3")
-
-METADATA = "metadata.yaml"
-
-LARGEST_METADATA = 4 << 20
-"""Most bytes of the description of a bag, which is read as a whole."""
-
 
 class Recorded(NamedTuple):
     """A recorded message, not decoded yet."""
@@ -110,6 +114,8 @@ class Recording:
     Args:
         paths: Files (``.bag``, ``.mcap``, ``.db3``), or the folder of a bag of ROS 2.
         warn: Called with a sentence about each part that is left out.
+        undecoded: Whether :meth:`messages` and :meth:`state_at` include the topics that
+            cannot be decoded.
 
     Raises:
         ConfigError: If there is no such file, or it cannot be read.
@@ -117,18 +123,22 @@ class Recording:
     """
 
     def __init__(
-        self, paths: Sequence[Path], *, warn: Callable[[str], object] = lambda _: None
+        self,
+        paths: Sequence[Path],
+        *,
+        warn: Callable[[str], object] = lambda _: None,
+        undecoded: bool = False,
     ) -> None:
         self.paths = tuple(paths)
         """Its files or its folder."""
         self.name = recording_name(paths)
         """The name, as shown to people."""
-        self.dialect: DialectName = _dialect(paths)
         self._warn = warn
         self._failed: set[str] = set()
         self._closed = False
-        self._reader = _opened(paths, self.dialect)
+        self._reader, self.dialect = opened(paths, dialect_of(paths))
         try:
+            self._warn_of_cut_files()
             self.begin = self._reader.start_time
             """Time of the first message, in nanoseconds since 1970."""
             self.end = self._reader.end_time
@@ -137,6 +147,9 @@ class Recording:
             self.topics: dict[str, RecordedTopic] = {}
             self._names: dict[str, str] = {}
             self._connections = self._usable()
+            self.connections = self._all_named() if undecoded else self._connections
+            """The topics in the files with messages in :meth:`messages`, as rosbags
+            describes them."""
         except ConfigError:
             self.close()
             raise
@@ -166,7 +179,22 @@ class Recording:
             ConfigError: If the file is damaged there.
 
         """
-        return self._read(self._connections, start, None)
+        return self._read(self.connections, start, None)
+
+    def _topic(self, name: str) -> RecordedTopic:
+        return self.topics.get(name) or RecordedTopic(name, "", False)
+
+    def definition(self, connection: "Connection") -> str:
+        """Return the definition of a topic's type and its parts; empty if unknown."""
+        if connection.msgdef.data:
+            return connection.msgdef.data
+        release: Literal[1, 2] = 1 if self.dialect == "ros1" else 2
+        try:
+            return self._reader.typestore.generate_msgdef(
+                connection.msgtype, ros_version=release
+            )[0]
+        except Exception:
+            return ""
 
     def messages_of(self, wants: Callable[[str, str], bool]) -> Iterator[Recorded]:
         """Yield all messages of some topics, in order.
@@ -203,7 +231,7 @@ class Recording:
             ConfigError: If the file is damaged before that time.
 
         """
-        static = [c for c in self._connections if is_static(self._names[c.topic])]
+        static = [c for c in self.connections if is_static(self._names[c.topic])]
         found: list[Recorded] = []
         for recorded in self._read(static, None, time + 1) if static else ():
             if not go_on():
@@ -211,9 +239,9 @@ class Recording:
             found.append(recorded)
         rest = [
             connection
-            for connection in self._connections
+            for connection in self.connections
             if connection not in static
-            and self.topics[self._names[connection.topic]].type not in LOGS
+            and self._topic(self._names[connection.topic]).type not in LOGS
         ]
         end, span, newest = time + 1, RECENT, dict[str, Recorded]()
         # Each further look back is longer, and only for topics without a message yet.
@@ -224,7 +252,7 @@ class Recording:
                 if not go_on():
                     return found
                 latest[recorded.topic] = recorded
-                if self.topics[recorded.topic].type == FRAMES:
+                if self._topic(recorded.topic).type == FRAMES:
                     found.append(recorded)
             newest |= latest
             end, span = begin, span * 4
@@ -232,10 +260,10 @@ class Recording:
                 connection
                 for connection in rest
                 if (name := self._names[connection.topic]) not in newest
-                and (self.topics[name].latched or time - end < LONGEST_LOOK)
+                and (self._topic(name).latched or time - end < LONGEST_LOOK)
             ]
         found += [
-            one for one in newest.values() if self.topics[one.topic].type != FRAMES
+            one for one in newest.values() if self._topic(one.topic).type != FRAMES
         ]
         return sorted(found, key=lambda one: one.time)
 
@@ -245,15 +273,19 @@ class Recording:
         None if its bytes do not fit its type, which is reported once for each topic.
         """
         try:
-            value = self._reader.deserialize(recorded.data, recorded.connection.msgtype)
-            return self._messages.message(self.topics[recorded.topic].type, value)
+            type_name, data = self.topics[recorded.topic].type, recorded.data
+            if is_json(recorded.connection):
+                fields = self.schema.fields(type_name)
+                data = bytes_of_json(fields, data, ros2=self.dialect == "ros2")
+            value = self._reader.deserialize(data, recorded.connection.msgtype)
+            return self._messages.message(type_name, value)
         except Exception as error:
             if recorded.topic not in self._failed:
                 self._failed.add(recorded.topic)
                 self._warn(
                     f"{self.name}: messages of {recorded.topic} that are not of the "
                     f"type {recorded.connection.msgtype} are not played "
-                    f"({_reason(error)})"
+                    f"({reason(error)})"
                 )
             return None
 
@@ -273,9 +305,12 @@ class Recording:
         """Return the connections that can be played; register topics and types."""
         if self._reader.message_count == 0:
             raise ConfigError(f"{self.name}: it contains no message")
-        _add_defaults(self._reader, self.dialect)
+        add_defaults(self._reader, self.dialect)
         usable = []
         for connection in self._reader.connections:
+            if why := why_unreadable(connection):
+                self._leave_out(connection, why)
+                continue
             try:
                 texts = texts_of(self._reader.typestore, connection.msgtype)
                 type_name = canonical(connection.msgtype)
@@ -291,7 +326,7 @@ class Recording:
                 self._leave_out(connection, f"it is a {known.type} too")
                 continue
             self.schema.define(texts)
-            latched = (known is not None and known.latched) or _is_latched_in_file(
+            latched = (known is not None and known.latched) or is_latched_in_file(
                 connection
             )
             latched = latched or is_latched(name, type_name)
@@ -301,116 +336,27 @@ class Recording:
             raise ConfigError(f"{self.name}: none of its topics can be played")
         return usable
 
+    def _all_named(self) -> "list[Connection]":
+        """Return all connections but further types of a topic that is played."""
+        rest = [
+            connection
+            for connection in self._reader.connections
+            if connection not in self._connections
+            and self._names.setdefault(connection.topic, connection.topic)
+            not in self.topics
+        ]
+        return self._connections + rest
+
+    def _warn_of_cut_files(self) -> None:
+        """Report each file that ends too early; it is played up to there."""
+        for file in mcap_files(self._reader):
+            if file.cut:
+                self._warn(
+                    f"{self.name} is played only up to where it can be read: "
+                    f"{file.cut}; `mcap recover` makes a complete file of that part"
+                )
+
     def _leave_out(self, connection: "Connection", why: str) -> None:
         self._warn(
             f"{self.name}: {connection.topic} ({connection.msgtype}) is left out: {why}"
         )
-
-
-def recording_name(paths: Sequence[Path]) -> str:
-    """Return the name of a recording: its file, and the number of further files."""
-    first = resolved(paths[0]).name or str(paths[0])
-    return first if len(paths) == 1 else f"{first} and {len(paths) - 1} more"
-
-
-def unreadable(paths: Sequence[Path], error: Exception) -> ConfigError:
-    """Return the error for a recording that cannot be read, with tools for a repair."""
-    text = f"{recording_name(paths)} cannot be read as a recording: {_reason(error)}"
-    if not isinstance(error, OSError):  # the system did not refuse to read it
-        text += f"; {_repair(paths)}"
-    return ConfigError(text)
-
-
-def _repair(paths: Sequence[Path]) -> str:
-    """Return which tools may repair a damaged recording."""
-    files = [each for path in paths for each in (path, *path.glob("*"))]
-    suffixes = {file.suffix for file in files if not file.is_dir()}
-    if ROS1 in suffixes:
-        return "if the file was not closed, `rosbag reindex` repairs it"
-    folder = "`ros2 bag reindex` repairs the metadata.yaml of its folder"
-    if ".mcap" in suffixes:
-        return f"if the file was not closed, `mcap recover` repairs it, and {folder}"
-    return f"if the file was not closed, {folder}"
-
-
-def _reason(error: Exception) -> str:
-    """Return why a file could not be read, for people."""
-    text = str(error).strip().partition("\n")[0].rstrip(".")
-    if not text or isinstance(error, AssertionError | LookupError | TypeError):
-        return "it is damaged or cut off"
-    return text[:200]
-
-
-def _dialect(paths: Sequence[Path]) -> DialectName:
-    kinds: set[DialectName] = set()
-    for path in paths:
-        if not path.exists():
-            raise ConfigError(f"{path}: there is no such file or folder")
-        _refuse_endless(path)
-        if path.is_dir() and not (path / METADATA).exists():
-            raise ConfigError(
-                f"{path}: there is no metadata.yaml in this folder, so it is not a bag "
-                f"of ROS 2; give the .mcap or .db3 file in it instead, or write the "
-                f"metadata.yaml with `ros2 bag reindex`"
-            )
-        if path.is_file() and path.suffix not in (ROS1, *ROS2):
-            raise ConfigError(
-                f"{path} is not the name of a recording; expected .bag, .mcap, .db3, "
-                f"or the folder of a bag of ROS 2"
-            )
-        kinds.add("ros1" if path.suffix == ROS1 and path.is_file() else "ros2")
-    if len(kinds) > 1:
-        raise ConfigError("bags of ROS 1 and of ROS 2 cannot be played as one")
-    return kinds.pop()
-
-
-def _refuse_endless(path: Path) -> None:
-    """Refuse files on which a reader would block for ever."""
-    refuse_special(path)
-    if not path.is_dir():
-        return
-    for entry in path.iterdir():
-        if entry.exists():  # a dangling link is left to the reader
-            refuse_special(entry)
-    about = path / METADATA
-    size = about.stat().st_size if about.is_file() else 0
-    if size > LARGEST_METADATA:
-        raise ConfigError(
-            f"{about}: got {size} bytes, expected at most {LARGEST_METADATA} for the "
-            f"description of a bag"
-        )
-
-
-def _opened(paths: Sequence[Path], dialect: DialectName) -> "AnyReader":
-    from rosbags.highlevel import AnyReader
-    from rosbags.typesys import Stores, get_typestore
-
-    # Bags of ROS 2 hold the definitions of their types only since Iron.
-    default = Stores.ROS1_NOETIC if dialect == "ros1" else Stores.ROS2_HUMBLE
-    try:
-        reader = AnyReader([*paths], default_typestore=get_typestore(default))
-        reader.open()
-    except Exception as error:
-        raise unreadable(paths, error) from None
-    return reader
-
-
-def _add_defaults(reader: "AnyReader", dialect: DialectName) -> None:
-    """Add the common types that the file itself does not define to a reader."""
-    from rosbags.typesys import Stores, get_typestore
-
-    known = reader.typestore.fielddefs
-    if all(connection.msgtype in known for connection in reader.connections):
-        return
-    default = Stores.ROS1_NOETIC if dialect == "ros1" else Stores.ROS2_HUMBLE
-    usual = get_typestore(default).fielddefs
-    reader.typestore.register({n: usual[n] for n in usual if n not in known})
-
-
-def _is_latched_in_file(connection: "Connection") -> bool:
-    from rosbags.interfaces import ConnectionExtRosbag1, QosDurability
-
-    if isinstance(connection.ext, ConnectionExtRosbag1):
-        return bool(connection.ext.latching)
-    durable = QosDurability.TRANSIENT_LOCAL
-    return any(q.durability == durable for q in connection.ext.offered_qos_profiles)

@@ -9,6 +9,7 @@ from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
+import msgspec
 import numpy as np
 
 from webmap.base.errors import ConfigError
@@ -120,6 +121,23 @@ class TypeVersion:
             return serialize(self._fields, whole, ros2=self._ros2)
         except (struct.error, UnicodeError) as error:
             raise Misfit(str(error)) from None
+
+
+def bytes_of_json(fields: Sequence[Field], text: bytes, *, ros2: bool) -> bytes:
+    """Return the serialized bytes of a message in JSON.
+
+    Args:
+        fields: The fields of its type.
+        text: The JSON.
+        ros2: Whether to serialize as in ROS 2; else as in ROS 1.
+
+    Raises:
+        Misfit: If the message does not fit the type.
+        DecodeError: If the text is no JSON.
+
+    """
+    message = _FromRobot(ros2=ros2).message(fields, msgspec.json.decode(text))
+    return serialize(fields, message, ros2=ros2)
 
 
 class Types:

@@ -39,6 +39,18 @@ from webmap.cli.options import PORT, Finite, web_options
     show_default=True,
     help="Port of the replay's rosbridge; 0 lets the system choose.",
 )
+@click.option(
+    "--foxglove",
+    is_flag=True,
+    help="Also serve the recording to Foxglove and Lichtblick on this computer.",
+)
+@click.option(
+    "--foxglove-port",
+    type=PORT,
+    default=8765,
+    show_default=True,
+    help="Port for --foxglove; 0 lets the system choose.",
+)
 @web_options
 def play(
     files: tuple[Path, ...],
@@ -46,6 +58,8 @@ def play(
     start: float,
     loop: bool,
     bridge_port: int,
+    foxglove: bool,
+    foxglove_port: int,
     web: dict[str, Any],
 ) -> None:
     """Play a recording on the map.
@@ -54,23 +68,33 @@ def play(
     (.mcap, .db3); several bags of ROS 1 are played as one. Nothing in a recording can
     be driven. This command needs rosbags: pip install "webmap[bags]".
 
+    With --foxglove, the page and Foxglove show one playback: each may pause and seek.
+    This needs foxglove-sdk: pip install "webmap[bags,foxglove]".
+
     \b
     webmap play office.bag
     webmap play rosbag2_2026_05_04/ --rate 4 --loop
+    webmap play drive.mcap --foxglove
     """
     import webmap
     from webmap import console
-    from webmap.bags import need_rosbags
-    from webmap.bags.recording import recording_name
+    from webmap.bags import need_foxglove, need_rosbags
+    from webmap.bags.files import recording_name
     from webmap.features.player.recording_player import RecordingPlayer, expect_jumps
     from webmap.fleet.overrides import ViewOnly
     from webmap.fleet.search import find_fleet
 
     need_rosbags()
+    if foxglove:
+        need_foxglove()
     name = recording_name(files)
     options = ["--rate", rate, "--start", start, "--port", bridge_port]
     options += ["--loop"] if loop else []
-    with replay(*options, "--", *files) as (url, command):
+    options += ["--foxglove-port", foxglove_port] if foxglove else []
+    with replay(*options, "--", *files) as (urls, command):
+        url, *served = urls.split()
+        if served:
+            echo(f"Foxglove and Lichtblick can connect to {served[0]}", err=True)
         bridge = webmap.Bridge(url, name=f"recording {name}")
         bridge.replays = True
         watched = ViewOnly(Path(name).stem)
@@ -89,7 +113,8 @@ def replay(
 ) -> Iterator[tuple[str, Callable[[PlaybackCommand], None]]]:
     """Run a replay as a child process.
 
-    Yields the URL of its rosbridge, and a function that gives it a command.
+    Yields the URL of its rosbridge, after a space the URL for Foxglove if there is one,
+    and a function that gives it a command.
 
     It ends with this process, however that ends, because its standard input closes.
 
