@@ -1,7 +1,8 @@
 """Write what WebMap installs: ``requirements/image.txt`` and an SBOM.
 
-``pins`` asks pip which versions it would install now, with all extras, and writes them
-with their hashes. They are those for this system and this version of Python::
+``pins`` asks pip which versions it would install now, with all extras of an image, and
+writes them with their hashes. They are those for this system and this version of
+Python::
 
     pip install --require-hashes -r requirements/image.txt
     pip install --no-deps webmap
@@ -24,14 +25,18 @@ ROOT = Path(__file__).parents[1]
 PINS = ROOT / "requirements/image.txt"
 
 HEAD = f"""\
-# Every package that an image of WebMap has, with all extras. Made by "make pins" for
+# Every package that an image of WebMap has, with its extras. Made by "make pins" for
 # {sys.platform} with Python {sys.version_info.major}.{sys.version_info.minor}.
 """
 
+NOT_IN_IMAGES = {"notebook"}
+"""Extras that an image does not need: it serves pages and has no notebook."""
+
 
 def extras() -> list[str]:
-    """Return the names of WebMap's extras."""
-    return sorted(distribution("webmap").metadata.get_all("Provides-Extra") or [])
+    """Return the names of WebMap's extras in an image."""
+    names = distribution("webmap").metadata.get_all("Provides-Extra") or []
+    return sorted(set(names) - NOT_IN_IMAGES)
 
 
 def graph() -> dict[str, set[str]]:

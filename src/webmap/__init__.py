@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from webmap.modules.map_layer import MapLayer
     from webmap.modules.placed import Placed
     from webmap.modules.robot_layer import RobotLayer
+    from webmap.notebook.widget import widget
     from webmap.poses.alignment import align_bridge
     from webmap.ros import messages, tf
     from webmap.ros.bridge import Bridge
@@ -93,6 +94,7 @@ __all__ = [
     "svg",
     "svg_ns",
     "tf",
+    "widget",
     "xlink_ns",
 ]
 
@@ -134,6 +136,7 @@ _HOMES = {
     "svg": "webmap.scene.svg",
     "svg_ns": "webmap.scene.svg:namespace",
     "tf": "webmap.ros.tf",
+    "widget": "webmap.notebook.widget:widget",
     "xlink_ns": "webmap.scene.svg:xlink_namespace",
 }
 

@@ -25,7 +25,8 @@ class Hanging {
 const online = [];
 globalThis.addEventListener = (_, fn) => online.push(fn);
 globalThis.WebSocket = Hanging;
-const { AnswerPace, Link } = await import("../../src/webmap/web/link.js");
+const { AnswerPace } = await import("../../src/webmap/web/frames.js");
+const { Link } = await import("../../src/webmap/web/link.js");
 
 function makeLink(t, first) {
   Hanging.made = [];

@@ -36,7 +36,7 @@ from webmap.scene.wire.messages import (
     ViewReport,
 )
 from webmap.scene.wire.session import SceneSession
-from webmap.server.page_socket import FAILED, PageSocket
+from webmap.server.page_socket import FAILED
 
 log = logging.getLogger("webmap.page")
 
@@ -96,6 +96,16 @@ class GateConnection(Protocol):
         """Remove the page, which has closed; the robots that it drove stop."""
 
 
+class SceneSocket(Protocol):
+    """What carries the scene to one page: a WebSocket, or a notebook's connection."""
+
+    def offer(self, item: bytes | str) -> None:
+        """Send a frame soon."""
+
+    def end(self, code: int, reason: str) -> None:
+        """Close the connection with a reason."""
+
+
 class PageHost:
     """One page of one viewer, kept when its socket is lost or the page is reloaded."""
 
@@ -112,7 +122,7 @@ class PageHost:
         self._key = key
         self._session = SceneSession()
         self._page: Page | None = None
-        self._socket: PageSocket | None = None
+        self._socket: SceneSocket | None = None
         self._watching: Removal | None = None
         self._giving_up: asyncio.TimerHandle | None = None
         self.lost_at: float | None = None
@@ -124,7 +134,7 @@ class PageHost:
 
     # From the socket.
 
-    def connected(self, socket: PageSocket) -> None:
+    def connected(self, socket: SceneSocket) -> None:
         """Use this socket from now on, once it has sent its hello."""
         if self._socket is not None:
             self._socket.end(FAILED, "this page was opened again in another tab")
@@ -132,7 +142,7 @@ class PageHost:
         self._stop_watching()
         self._stay()
 
-    def receive(self, socket: PageSocket, text: str) -> None:
+    def receive(self, socket: SceneSocket, text: str) -> None:
         """Process one message of the page."""
         if socket is not self._socket:
             return
@@ -160,7 +170,7 @@ class PageHost:
             case Trouble(text=text):
                 log.warning("%r: the page reports: %s", self, text)
 
-    def lost(self, socket: PageSocket) -> None:
+    def lost(self, socket: SceneSocket) -> None:
         """Set that the socket was lost; the page is kept for a while."""
         if socket is not self._socket:
             return
@@ -170,7 +180,9 @@ class PageHost:
             self.close()
             return
         self.lost_at = time.monotonic()
-        self._giving_up = asyncio.get_running_loop().call_later(KEPT_FOR, self.close)
+        self._giving_up = asyncio.get_running_loop().call_later(
+            self._pages.kept_for, self.close
+        )
 
     def tick(self, now: float) -> bool:
         """Send the changes, if the page keeps up; return whether there were some."""
@@ -306,7 +318,7 @@ class SceneHandle:
     """The web thread's end of one scene socket; it only passes messages on."""
 
     def __init__(
-        self, pages: "OpenPages", key: PageKey, viewer: Viewer, socket: PageSocket
+        self, pages: "OpenPages", key: PageKey, viewer: Viewer, socket: SceneSocket
     ) -> None:
         self._pages = pages
         self._socket = socket
@@ -365,10 +377,15 @@ class OpenPages:
         self._closed = 0
         self._drives: dict[tuple[str, str], GateConnection] = {}
 
+    @property
+    def kept_for(self) -> float:
+        """Seconds for which a page is kept whose socket was lost."""
+        return KEPT_FOR
+
     # From the web thread.
 
     def open_scene(
-        self, entry_path: str, page_id: str, viewer: Viewer, socket: PageSocket
+        self, entry_path: str, page_id: str, viewer: Viewer, socket: SceneSocket
     ) -> SceneHandle:
         """Open a page whose socket was accepted; return without waiting."""
         return SceneHandle(self, (entry_path, page_id, viewer.id), viewer, socket)
@@ -439,7 +456,7 @@ class OpenPages:
         if self._unbuilt:
             asyncio.get_running_loop().call_soon(self._build_next)
         # The objects of a page would make a collection due, which looks at all robots.
-        gc.freeze()
+        self.freeze()
         host.build(sizes)
 
     def built(self) -> None:
@@ -455,6 +472,10 @@ class OpenPages:
             self._closed = 0
             gc.unfreeze()
             gc.collect()
+        self.freeze()
+
+    def freeze(self) -> None:
+        """Except all present objects from collections of garbage."""
         gc.freeze()
 
     def _make_room(self) -> None:

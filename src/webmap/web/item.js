@@ -264,7 +264,7 @@ export class Item {
 
   /** Remove the element from the page. */
   release() {
-    if (this.element !== document.body) this.element.remove();
+    this.element.remove();
   }
 
   /**
@@ -278,6 +278,12 @@ export class Item {
     }
     if (text !== null) setText(element, text);
   }
+}
+
+/** The element that contains what Python appends to the page; it stays. */
+export class BodyItem extends Item {
+  /** @override */
+  release() {}
 }
 
 /** An element of the user's own page, with its original state to restore it. */

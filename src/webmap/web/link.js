@@ -10,40 +10,6 @@ const LONGEST_WAIT = 5000;
 const FIRST_PATIENCE = 5000;
 const LONGEST_PATIENCE = 20_000;
 
-/** Milliseconds that drawing may take in each frame of a display with 60 Hz. */
-const CHEAP = 4;
-
-/** Milliseconds between frames until which drawing takes a quarter of the time. */
-const SLOW = 50;
-
-/** The weight of the newest frame in the mean cost, and the most of it that counts. */
-const NEWEST = 0.25;
-const MOST = 100;
-
-/**
- * When the page answers what it has drawn. The server sends no more than two frames
- * without an answer, so the answers decide how often they come: drawing takes a quarter
- * of the time; or up to half of it, so that there are 20 frames a second.
- */
-export class AnswerPace {
-  constructor() {
-    this._cost = 0;
-  }
-
-  /**
-   * @param {number} took Milliseconds for which drawing a frame occupied the page.
-   */
-  drawn(took) {
-    this._cost += (Math.min(took, MOST) - this._cost) * NEWEST;
-  }
-
-  /** Milliseconds after drawing until the answer; 0 to answer before the painting. */
-  get pause() {
-    const cost = this._cost;
-    return cost <= CHEAP ? 0 : Math.min(3 * cost, Math.max(cost, SLOW - cost));
-  }
-}
-
 /**
  * @typedef {object} LinkEvents
  * @property {() => void} opened

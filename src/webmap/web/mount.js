@@ -1,4 +1,4 @@
-import { BoundItem, Item, createElement } from "./item.js";
+import { BodyItem, BoundItem, Item, createElement } from "./item.js";
 import { PLACE } from "./opcodes.js";
 
 /** A fragment at one position of the page. */
@@ -99,10 +99,11 @@ export class Mount {
 
   /**
    * @param {number} id
+   * @param {HTMLElement} body
    * @returns {Item} The document, as the root.
    */
-  createDocument(id) {
-    return this._add(new Item(id, document.body, null));
+  createDocument(id, body) {
+    return this._add(new BodyItem(id, body, null));
   }
 
   /**

@@ -10,11 +10,11 @@ import { BASE, whyRefused } from "./access.js";
 import { LONGEST_TEXTS } from "./constants.js";
 import { Reports } from "./events.js";
 import { BrowserParts, importOf } from "./browser_parts.js";
-import { AnswerPace, Link } from "./link.js";
+import { Frames } from "./frames.js";
+import { Link } from "./link.js";
 import { Notices } from "./notices.js";
 import { dark, id, path, sceneAddress, takeFirstSocket } from "./opening.js";
 import { Scene } from "./scene.js";
-import { VersionError } from "./wire.js";
 
 /** @typedef {import('./drive.js').Drive} Drive */
 
@@ -23,8 +23,6 @@ const SILENT = 3000;
 const DEAD = 10_000;
 /** Milliseconds between two checks; the server sends at least every second. */
 const LOOK_PERIOD = 500;
-/** Frames in a row that may fail before the page stops requesting new ones. */
-const FAILURES = 3;
 
 /** One open page: its connection to the display, its scene, its notices. */
 export class Page {
@@ -49,7 +47,14 @@ export class Page {
       onEvent: (mount, item, kind, event) => this._reports.report(mount, item, kind, event),
       drive: () => this.drive,
       parts: this.parts,
+      root: document,
+      body: document.body,
     });
+    this._frames = new Frames(
+      (data, received) => this.scene.apply(data, received),
+      (message) => this.send(message),
+      (error, forGood) => this._misunderstood(error, forGood),
+    );
     this._reports = new Reports(
       (message) => this.send(message),
       (node) => this.scene.mapOf(node),
@@ -58,14 +63,9 @@ export class Page {
     this._drive = null;
     /** @type {typeof import('./drive.js') | null} */
     this._driving = null;
-    /** @type {Array<{data: ArrayBuffer, received: number}>} */
-    this._frames = [];
-    this._drawing = 0;
-    this._pace = new AnswerPace();
     this._restyling = 0;
     /** Whether nothing came yet over this connection. */
     this._isNew = false;
-    this._failures = 0;
     this._listening = performance.now();
     /**
      * Removes the STOP of a page without a picture; null once there was a picture.
@@ -138,7 +138,7 @@ export class Page {
 
   _opened() {
     this._listening = performance.now();
-    this._frames = [];
+    this._frames.clear();
     this._isNew = true;
   }
 
@@ -149,13 +149,13 @@ export class Page {
   _received(data, at) {
     this._listening = performance.now();
     this._returned = document.hidden;
-    this._frames.push({ data, received: at / 1000 });
+    this._frames.add(data, at);
     this._connected();
     const first = this._isNew;
     this._isNew = false;
     // Before the first picture there is none, or an old one: do not wait to draw it.
-    if (first && !document.hidden) this._draw();
-    else this._drawing ||= requestAnimationFrame(() => this._draw());
+    if (first && !document.hidden) this._frames.draw();
+    else this._frames.drawSoon();
   }
 
   _connected() {
@@ -177,7 +177,7 @@ export class Page {
    * @param {boolean} forGood
    */
   _closed(reason, forGood) {
-    this._frames = [];
+    this._frames.clear();
     this._why = reason;
     const what = reason ? `No connection to WebMap: ${reason}.` : "No connection to WebMap.";
     this._disconnected(`${what} ${forGood ? "Reload the page." : "Reconnecting…"}`);
@@ -215,33 +215,12 @@ export class Page {
   _look() {
     this._link.look();
     // A hidden page draws nothing, so the server stops sending to it.
-    if (document.hidden || this._frames.length > 0) this._listening = performance.now();
+    if (document.hidden || this._frames.wait) this._listening = performance.now();
     const silent = performance.now() - this._listening;
     if (silent < SILENT || !this._link.isOpen) return;
     this._disconnected("No data from WebMap. The page shows stale data.");
     // A connection that was lost while the page was hidden needs no longer wait.
     if (silent > (this._returned ? SILENT : DEAD)) this._link.renew();
-  }
-
-  // Frames ---------------------------------------------------------------------
-
-  _draw() {
-    this._drawing = 0;
-    const begun = performance.now();
-    let newest = 0;
-    for (const { data, received } of this._frames.splice(0)) {
-      newest = this._apply(data, received);
-      if (newest === 0) break;
-    }
-    if (newest === 0) return;
-    const answer = () => this.send({ op: "seen", frame: newest });
-    const { pause } = this._pace;
-    if (pause === 0) answer();
-    // A timer runs after style, layout and painting of this frame.
-    setTimeout(() => {
-      this._pace.drawn(performance.now() - begun);
-      if (pause > 0) setTimeout(answer, pause);
-    });
   }
 
   /** Sheets that load together are read once, because each reading computes styles. */
@@ -251,29 +230,12 @@ export class Page {
   }
 
   /**
-   * @param {ArrayBuffer} data
-   * @param {number} received
-   * @returns {number} The number of the frame; 0 if it was not valid.
+   * @param {unknown} error
+   * @param {boolean} forGood
    */
-  _apply(data, received) {
-    try {
-      const number = this.scene.apply(data, received);
-      this._failures = 0;
-      return number;
-    } catch (error) {
-      this._misunderstood(error);
-      return 0;
-    }
-  }
-
-  /** @param {unknown} error */
-  _misunderstood(error) {
-    this._frames = [];
-    this._failures += 1;
+  _misunderstood(error, forGood) {
     this.trouble(`This page cannot read a message from WebMap: ${error}`);
-    const hopeless = error instanceof VersionError || this._failures >= FAILURES;
-    if (hopeless) this._link.end();
-    else this.send({ op: "resync" });
+    if (forGood) this._link.end();
   }
 }
 

@@ -32,7 +32,10 @@ const LOOK_PERIOD = 250;
  * @property {(mount: number, item: Item, kind: string, event: Event) => void} onEvent
  *     Handles an event.
  * @property {() => import('./drive.js').Drive} drive The page's connection to the gate.
- * @property {import('./browser_parts.js').BrowserParts} parts
+ * @property {Pick<import('./browser_parts.js').BrowserParts,
+ *     "attach" | "detach" | "detachFrom" | "receive">} parts
+ * @property {Document | ShadowRoot} root Contains the page's own elements.
+ * @property {HTMLElement} body Contains what Python appends to the page.
  */
 
 /**
@@ -68,9 +71,16 @@ export class Scene {
     /** @type {Set<string>} Paths of images that could not be loaded. */
     this._lost = new Set();
     this._unseen = "";
-    setInterval(() => this._reportUnseen(), LOOK_PERIOD);
+    this._looking = setInterval(() => this._reportUnseen(), LOOK_PERIOD);
     // Such an error does not bubble, but it can be captured.
-    document.addEventListener("error", ({ target }) => this._onLost(target), true);
+    page.root.addEventListener("error", ({ target }) => this._onLost(target), true);
+  }
+
+  /** Remove everything from the page; no frame may be applied afterwards. */
+  end() {
+    this._clear();
+    this._ages.stop();
+    clearInterval(this._looking);
   }
 
   /** Send which dots are not shown, such as those of a layer that is off. */
@@ -401,7 +411,7 @@ export class Scene {
 
   /** @param {number} id */
   document(id) {
-    for (const mount of this._targets) mount.createDocument(id);
+    for (const mount of this._targets) mount.createDocument(id, this._page.body);
   }
 
   /**
@@ -409,7 +419,7 @@ export class Scene {
    * @param {string} htmlId
    */
   bind(id, htmlId) {
-    const found = document.getElementById(htmlId);
+    const found = this._page.root.getElementById(htmlId);
     if (!found) this._page.notice(`This page has no element with the id "${htmlId}".`);
     // A missing element is replaced by an invisible one.
     const element = found ?? document.createElement("div");

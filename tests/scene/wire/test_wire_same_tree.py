@@ -29,6 +29,8 @@ async (frames) => {
     hear() {},
     drive() {},
     parts: { detachFrom() {} },
+    root: document,
+    body: document.body,
   });
   for (const frame of frames) {
     const bytes = Uint8Array.from(atob(frame), (c) => c.charCodeAt(0));
