@@ -15,6 +15,7 @@ import msgspec
 from webmap.base.errors import ConfigError, MotionError
 from webmap.base.geometry import Pose, Twist
 from webmap.base.lifecycle import lifecycle
+from webmap.base.outline import polygon_around
 from webmap.base.tasks import spawn
 from webmap.config.checks import Mistakes, same_name
 from webmap.config.motion import (
@@ -30,7 +31,7 @@ from webmap.core.robot_names import named_robots
 from webmap.gate.limits import PLANE, Axes
 from webmap.gate.protocol import AssistSpec, RobotReport, RobotSpec
 from webmap.gate.rules.obedience import MOST_NAME, MOST_NODES
-from webmap.gate.specs import checked, checked_assist, polygon_around
+from webmap.gate.specs import checked, checked_assist
 from webmap.poses.odometry import TypeQuery
 from webmap.ros.bridge import Bridge
 from webmap.ros.motion_topics import STOP

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
+from webmap.base.outline import Point
 from webmap.base.roles import Role
 from webmap.gate.commands import ProgramCommand, Velocity
 
@@ -34,10 +35,6 @@ class Identity(
 GoalMethod = Literal["topic", "navigate_to_pose", "move_base"]
 """How goals are sent: as PoseStamped on a topic, to the action of ROS 2, or to that of
 ROS 1."""
-
-
-Point = tuple[float, float]
-"""x (forward) and y (left) in metres, in the robot's own frame."""
 
 
 class AssistSpec(msgspec.Struct, frozen=True, kw_only=True):
