@@ -10,6 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import msgspec
 
 from webmap.base.errors import ConfigError
+from webmap.base.outline import Point, polygon_around, why_no_outline
 from webmap.config import checks
 from webmap.config.checks import KeyPath, Mistakes
 from webmap.config.reading import Config
@@ -45,14 +46,14 @@ _covariance = checks.expecting(
 )
 
 
-def _size(value: Any) -> float | list[tuple[float, ...]]:
+def _size(value: Any) -> float | list[Point]:
     if isinstance(value, Real):
         return float(checks.above_zero("metres")(value))
     corner = checks.numbers(2, checks.finite("a number of metres"))
     corners = [corner(each) for each in checks.items(value)]
     if len(corners) < 3:
         raise ConfigError("3 corners or more")
-    return corners
+    return [(x, y) for x, y in corners]
 
 
 _footprint = checks.expecting(
@@ -175,7 +176,7 @@ class ScanAssistConfig(Config, kw_only=True, frozen=True):
 
     topic: Annotated[str, checks.topic]
     """A topic of type ``sensor_msgs/LaserScan``, on the bridge of the velocity."""
-    footprint: Annotated[float | list[tuple[float, float]], _footprint]
+    footprint: Annotated[float | list[Point], _footprint]
     """The robot's radius, or its corners in its own frame, in order, in metres."""
     x: Annotated[float, checks.finite("a number of metres")] = 0.0
     """The scanner's position, forward of the base."""
@@ -199,9 +200,21 @@ class ScanAssistConfig(Config, kw_only=True, frozen=True):
     """The speed when creeping."""
 
     @property
-    def yaw(self) -> float:
-        """The scanner's direction, in radians."""
-        return math.radians(self.angle)
+    def sensor(self) -> tuple[float, float, float]:
+        """The pose of the scanner on the robot: x, y in metres, yaw in radians."""
+        return (self.x, self.y, math.radians(self.angle))
+
+    @property
+    def corners(self) -> tuple[Point, ...]:
+        """The corners of the robot, around its disc if the footprint is a radius."""
+        size = self.footprint
+        return polygon_around(size) if isinstance(size, float) else tuple(size)
+
+    def check(self, path: KeyPath, mistakes: Mistakes) -> None:
+        """Add mistakes that concern several fields."""
+        why = why_no_outline(self.corners)
+        if why is not None:
+            mistakes.add((*path, "footprint"), why)
 
 
 class MotionConfig(Config, kw_only=True, frozen=True):

@@ -2,10 +2,8 @@
 
 import hashlib
 import logging
-import math
 import time
 from collections import Counter
-from collections.abc import Mapping
 from concurrent.futures import Future
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -15,7 +13,6 @@ import msgspec
 from webmap.base.errors import ConfigError, MotionError
 from webmap.base.geometry import Pose, Twist
 from webmap.base.lifecycle import lifecycle
-from webmap.base.outline import polygon_around
 from webmap.base.tasks import spawn
 from webmap.config.checks import Mistakes, same_name
 from webmap.config.motion import (
@@ -26,12 +23,12 @@ from webmap.config.motion import (
     ScanAssistConfig,
     TwistConfig,
 )
-from webmap.config.reading import Config, read_part
+from webmap.config.reading import Config
 from webmap.core.robot_names import named_robots
 from webmap.gate.limits import PLANE, Axes
 from webmap.gate.protocol import AssistSpec, RobotReport, RobotSpec
 from webmap.gate.rules.obedience import MOST_NAME, MOST_NODES
-from webmap.gate.specs import checked, checked_assist
+from webmap.gate.specs import checked
 from webmap.poses.odometry import TypeQuery
 from webmap.ros.bridge import Bridge
 from webmap.ros.motion_topics import STOP
@@ -46,14 +43,6 @@ log = logging.getLogger("webmap.robot")
 
 ASK_WRITERS = 10.0
 """Seconds between two queries of a bridge for other publishers of velocities."""
-
-PARTS: dict[str, type[Config]] = {
-    "twist": TwistConfig,
-    "move": MoveConfig,
-    "initial_pose": InitialPoseConfig,
-    "scan_assist": ScanAssistConfig,
-}
-"""The parts of a robot's motion."""
 
 WRITING = ("twist", "move", "initial_pose")
 """The parts that the gate writes for; the first one of a robot sets its bridge."""
@@ -181,25 +170,19 @@ class RobotMotion:
         links = (self._bridges.get(key) for key in WRITING)
         return any(link is not None and is_agent_url(link.url) for link in links)
 
-    def set(
-        self, key: str, values: Mapping[str, Any] | None, bridge: Bridge | None = None
-    ) -> None:
+    def set(self, key: str, part: Config | None, bridge: Bridge | None = None) -> None:
         """Set or clear one part of the configuration.
 
         Args:
             key: The part, a field of ``MotionConfig``.
-            values: The part's plain values; None clears the part. An empty value counts
-                as left out where that is the default.
+            part: The part, whose values are valid; None clears the part.
             bridge: The bridge of the part, if it has one.
 
         Raises:
-            ConfigError: If a value is not valid; the message lists every mistake.
+            ConfigError: If the part does not fit the others, or the gate cannot move
+                robots behind the bridge.
 
         """
-        part = None
-        if values is not None:
-            url = "" if bridge is None else bridge.url
-            part = read_part(PARTS[key], key, values, f"robot {self._name!r}", url)
         config = msgspec.structs.replace(self.config, **{key: part})
         bridges = {**self._bridges, key: bridge}
         if part is not None:
@@ -279,8 +262,6 @@ class RobotMotion:
         mistakes = Mistakes()
         config.check((), mistakes)
         mistakes.refuse(f"robot {self._name!r}")
-        if config.scan_assist is not None:
-            checked_assist(self._name, _assist(config.scan_assist))
         spec = self._spec(config, bridges)
         if spec is not None:
             checked(spec)
@@ -476,12 +457,10 @@ def _goal_type(move: MoveConfig | None, name: str) -> str:
 
 def _assist(config: ScanAssistConfig) -> AssistSpec:
     """Return the gate's form of scan assist: a radius becomes corners."""
-    size = config.footprint
-    corners = polygon_around(size) if isinstance(size, float) else tuple(size)
     return AssistSpec(
         topic=config.topic,
-        footprint=corners,
-        sensor=(config.x, config.y, math.radians(config.angle)),
+        footprint=config.corners,
+        sensor=config.sensor,
         upside_down=config.upside_down,
         frame=config.frame,
         stop_distance=config.stop_distance,

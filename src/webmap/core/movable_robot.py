@@ -5,13 +5,22 @@ import functools
 import inspect
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Concatenate, Literal, ParamSpec, TypeVar
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    ClassVar,
+    Concatenate,
+    Literal,
+    ParamSpec,
+    TypeVar,
+)
 
 from webmap.base.errors import ConfigError, MotionError
 from webmap.base.geometry import Orientation, Position, Quaternion, Twist
 from webmap.base.scope import no_scope
-from webmap.config.motion import COVARIANCE, NAVIGATE_TO_POSE
-from webmap.config.robot import LINKED, MOTION
+from webmap.config.motion import COVARIANCE, NAVIGATE_TO_POSE, MotionConfig
+from webmap.config.reading import Config, read_part, tables_of
+from webmap.config.robot import LINKED
 from webmap.core.extendable import Extendable
 from webmap.core.module_arguments import WrongArguments, check_arguments
 from webmap.core.motion import RobotMotion
@@ -77,6 +86,9 @@ class MovableRobot(Extendable):
         namespace: The namespace of its modules.
 
     """
+
+    _parts: ClassVar[Mapping[str, type[Config]]] = tables_of(MotionConfig)
+    """The parts of its configuration that :meth:`configure` sets, by their keys."""
 
     def __init__(self, name: str, namespace: Namespace) -> None:
         super().__init__(namespace)
@@ -175,19 +187,20 @@ class MovableRobot(Extendable):
 
         """
         what = f"robot {self.name!r}"
-        if key not in MOTION:
-            raise ConfigError(
-                f'{what}: there is no key "{key}" here; there are {", ".join(MOTION)}'
-            )
-        if key in LINKED and values is not None and bridge is None:
-            raise ConfigError(f"{what}: {key}: a bridge is missing")
-        with no_scope():
-            self.motion.set(key, values, bridge)
-        twist = self.motion.config.twist
-        self._show_base(holonomic=twist is not None and twist.holonomic)
+        if key not in self._parts:
+            keys = ", ".join(self._parts)
+            raise ConfigError(f'{what}: there is no key "{key}" here; there are {keys}')
+        part = None
+        if values is not None:
+            if key in LINKED and bridge is None:
+                raise ConfigError(f"{what}: {key}: a bridge is missing")
+            url = "" if bridge is None else bridge.url
+            part = read_part(self._parts[key], key, values, what, url)
+        self._set_part(key, part, bridge)
 
-    def _show_base(self, *, holonomic: bool) -> None:
-        """Show on pages what the base can do."""
+    def _set_part(self, key: str, part: Config | None, bridge: Bridge | None) -> None:
+        with no_scope():
+            self.motion.set(key, part, bridge)
 
     @sets_part("scan_assist")
     def set_scan_assist(
