@@ -4,14 +4,13 @@ import hashlib
 import logging
 import time
 from collections import Counter
-from concurrent.futures import Future
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import msgspec
 
 from webmap.base.errors import ConfigError, MotionError
-from webmap.base.geometry import Pose, Twist
+from webmap.base.geometry import Pose
 from webmap.base.lifecycle import lifecycle
 from webmap.base.tasks import spawn
 from webmap.config.checks import Mistakes, same_name
@@ -36,7 +35,6 @@ from webmap.ros.names import is_agent_url, is_type
 
 if TYPE_CHECKING:
     from webmap.agents.gates import Gates
-    from webmap.core.base_page import BasePage
     from webmap.gate.display.client import GateClient
 
 log = logging.getLogger("webmap.robot")
@@ -130,8 +128,8 @@ def _axes(twist: TwistConfig | None) -> Axes:
 class RobotMotion:
     """The gate's description of one robot, updated as topics change.
 
-    It also passes the robot's commands to the gate. Nothing here writes to a robot; the
-    gate decides.
+    The robot's commands go to the gate of :meth:`commands`. Nothing here writes to a
+    robot; the gate decides.
     """
 
     agent: str = ""
@@ -334,56 +332,22 @@ class RobotMotion:
         robot_motions.discard(self)
         named_robots.pop(self.id, None)
 
-    def take(self) -> "Future[int]":
-        """Request control for this program."""
-        return self._gate().take(self.id)
-
-    def release(self) -> None:
-        """Release the program's control; the robot is stopped."""
-        self._gate().release(self.id)
-
-    def twist(self, twist: Twist) -> None:
-        """Send the gate one velocity command of this program.
+    def commands(self) -> "Gates | GateClient":
+        """Return the gate, for a command to this robot.
 
         Raises:
-            MotionError: If the twist topic has no limit for an axis of the command.
+            MotionError: If WebMap is not started, or nothing moves the robot.
 
         """
-        gate = self._gate()
-        if why := self.axes.refusal(twist):
-            raise MotionError(f"robot {self._name!r}: the velocity was not sent: {why}")
-        gate.twist(self.id, twist)
-
-    def move(self, x: float, y: float, yaw: float, by: "BasePage | None") -> None:
-        """Send the gate one goal, of this program or in the name of a page."""
-        gate = self._gate()
-        if by is None:
-            gate.move(self.id, x, y, yaw)
-        else:
-            by.move(self.id, x, y, yaw)
-
-    def locate(self, x: float, y: float, yaw: float) -> None:
-        """Send the gate the robot's pose, from this program."""
-        self._gate().locate(self.id, x, y, yaw)
-
-    def cancel(self) -> None:
-        """Cancel the robot's goals through the gate."""
-        self._gate().cancel(self.id)
-
-    def stop(self) -> None:
-        """Stop the robot through the gate, no matter who has control."""
-        self._gate().stop_robot(self.id)
-
-    def reset_stop(self, report: RobotReport | None) -> None:
-        """End the STOP in a report through the gate."""
-        gate = self._gate()
-        stop = None if report is None else report.stop
-        if stop is None:
+        if self.gate is None or not lifecycle.running:
             raise MotionError(
-                f"robot {self._name!r}: its report has no STOP to reset; after stop(), "
-                "wait until report.stop is set"
+                f"robot {self._name!r} cannot be moved before webmap.start()"
             )
-        gate.reset(self.id, stop.id)
+        if not any(getattr(self.config, key) for key in WRITING):
+            raise MotionError(
+                f"robot {self._name!r} has no twist topic and no move topic"
+            )
+        return self.gate
 
     def on_report(self, report: RobotReport) -> None:
         """Query the names of other publishers while another program is driving."""
@@ -401,17 +365,6 @@ class RobotMotion:
             sound = [name[:MOST_NAME] for name in others if name.isprintable()]
             self.writers = tuple(sound[:MOST_NODES])
             self.gate.name_writers(self.id, tuple(others))
-
-    def _gate(self) -> "Gates | GateClient":
-        if self.gate is None or not lifecycle.running:
-            raise MotionError(
-                f"robot {self._name!r} cannot be moved before webmap.start()"
-            )
-        if not any(getattr(self.config, key) for key in WRITING):
-            raise MotionError(
-                f"robot {self._name!r} has no twist topic and no move topic"
-            )
-        return self.gate
 
     def _take_type(self, found: str) -> None:
         twist = self.config.twist

@@ -347,7 +347,7 @@ class MovableRobot(Extendable):
             if time.monotonic() > deadline:
                 break  # the gate gives the reason
             await asyncio.sleep(0.02)
-        epoch = await asyncio.wrap_future(self.motion.take())
+        epoch = await asyncio.wrap_future(self.motion.commands().take(self.id))
         while (why := self._not_drivable(epoch)) is not None:
             if time.monotonic() > deadline:
                 self.release_lease()
@@ -374,7 +374,7 @@ class MovableRobot(Extendable):
 
     def release_lease(self) -> None:
         """Release control; a moving robot is stopped."""
-        self.motion.release()
+        self.motion.commands().release(self.id)
 
     def twist(
         self,
@@ -408,7 +408,10 @@ class MovableRobot(Extendable):
                 limit for it, or a number is not finite.
 
         """
-        self.motion.twist(Twist(x, y, rz, z, rx, ry))
+        gate, twist = self.motion.commands(), Twist(x, y, rz, z, rx, ry)
+        if why := self.motion.axes.refusal(twist):
+            raise MotionError(f"robot {self.name!r}: the velocity was not sent: {why}")
+        gate.twist(self.id, twist)
 
     def move(
         self,
@@ -437,7 +440,11 @@ class MovableRobot(Extendable):
         """
         o = orientation
         yaw = Quaternion(o.x, o.y, o.z, o.w).yaw
-        self.motion.move(position.x, position.y, yaw, by)
+        gate = self.motion.commands()
+        if by is None:
+            gate.move(self.id, position.x, position.y, yaw)
+        else:
+            by.move(self.id, position.x, position.y, yaw)
 
     def locate(self, position: Position, orientation: Orientation) -> None:
         """Send the robot its own pose, while it neither moves nor follows a goal.
@@ -451,11 +458,12 @@ class MovableRobot(Extendable):
 
         """
         o = orientation
-        self.motion.locate(position.x, position.y, Quaternion(o.x, o.y, o.z, o.w).yaw)
+        yaw = Quaternion(o.x, o.y, o.z, o.w).yaw
+        self.motion.commands().locate(self.id, position.x, position.y, yaw)
 
     def cancel(self) -> None:
         """Cancel the robot's goals, whoever sent them; this needs no control."""
-        self.motion.cancel()
+        self.motion.commands().cancel(self.id)
 
     def stop(self) -> None:
         """Stop the robot, no matter who has control, and cancel its goals.
@@ -463,7 +471,7 @@ class MovableRobot(Extendable):
         The STOP stays active for all operators and programs, also after a restart,
         until :meth:`reset_stop` or Reset on a page.
         """
-        self.motion.stop()
+        self.motion.commands().stop_robot(self.id)
 
     def reset_stop(self) -> None:
         """End the STOP in ``report``; nothing moves, and control does not change.
@@ -476,7 +484,14 @@ class MovableRobot(Extendable):
                 ``report.stop`` is set.
 
         """
-        self.motion.reset_stop(self.report)
+        gate, report = self.motion.commands(), self.report
+        stop = None if report is None else report.stop
+        if stop is None:
+            raise MotionError(
+                f"robot {self.name!r}: its report has no STOP to reset; after stop(), "
+                "wait until report.stop is set"
+            )
+        gate.reset(self.id, stop.id)
 
     # Reports of the gate.
 
