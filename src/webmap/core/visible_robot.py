@@ -11,9 +11,14 @@ from webmap.base.audience import audience
 from webmap.base.geometry import Pose, Quaternion, Twist, Vector3
 from webmap.base.scope import Removal, keep
 from webmap.config.checks import Mistakes
-from webmap.config.motion import MotionConfig
-from webmap.config.reading import Config, read, tables_of
-from webmap.config.robot import BATTERY_LOW, OdometryConfig, RobotConfig, TfConfig
+from webmap.config.reading import Config, read
+from webmap.config.robot import (
+    BATTERY_LOW,
+    PARTS,
+    OdometryConfig,
+    RobotConfig,
+    TfConfig,
+)
 from webmap.core.movable_robot import MovableRobot, sets_part
 from webmap.core.pose_source import PoseSource
 from webmap.core.problems import Problems
@@ -53,7 +58,7 @@ class VisibleRobot(MovableRobot):
     The arguments are those of :class:`webmap.Robot`.
     """
 
-    _parts = tables_of(RobotConfig, "odometry", "tf") | tables_of(MotionConfig)
+    _parts = PARTS
 
     def __init__(
         self,
