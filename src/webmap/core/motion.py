@@ -25,7 +25,7 @@ from webmap.config.motion import (
 from webmap.config.reading import Config
 from webmap.core.robot_names import named_robots
 from webmap.gate.limits import PLANE, Axes
-from webmap.gate.protocol import AssistSpec, RobotReport, RobotSpec
+from webmap.gate.protocol import AssistSpec, RobotReport, RobotSpec, StopHook
 from webmap.gate.rules.obedience import MOST_NAME, MOST_NODES
 from webmap.gate.specs import checked
 from webmap.poses.odometry import TypeQuery
@@ -273,7 +273,10 @@ class RobotMotion:
         driven: dict[str, Any] = {}
         if twist is not None:
             driven = {name: getattr(twist, name) for name in OF_BASE}
-            driven["stop_hooks"] = tuple(map(msgspec.to_builtins, twist.stop_hooks))
+            driven["stop_hooks"] = tuple(
+                StopHook(topic=hook.topic, service=hook.service, type=hook.type)
+                for hook in twist.stop_hooks
+            )
             driven["twist_topic"] = twist.topic
             if config.scan_assist is not None:
                 driven["assist"] = _assist(config.scan_assist)

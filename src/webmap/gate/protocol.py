@@ -60,6 +60,28 @@ class AssistSpec(msgspec.Struct, frozen=True, kw_only=True):
     """The speed of creeping, in m/s."""
 
 
+class StopHook(
+    msgspec.Struct,
+    frozen=True,
+    kw_only=True,
+    omit_defaults=True,
+    repr_omit_defaults=True,
+):
+    """What else is sent to a robot's bridge on STOP: a topic or a service."""
+
+    topic: str = ""
+    """A topic of type ``std_msgs/Bool``: true is published, and false on reset."""
+    service: str = ""
+    """A service of type ``std_srvs/Trigger``, which is called."""
+    type: str = ""
+    """The type, in either dialect; that of ROS 1 if empty."""
+
+    @property
+    def name(self) -> str:
+        """The name of the topic or of the service."""
+        return self.topic or self.service
+
+
 class RobotSpec(
     msgspec.Struct, frozen=True, kw_only=True, tag="declare", omit_defaults=True
 ):
@@ -130,10 +152,7 @@ class RobotSpec(
     poses arrive on the common map, and are sent to the robot in its own map."""
     assist: AssistSpec | None = None
     """The scan assist of the robot; ``None`` is off."""
-    stop_hooks: tuple[dict[str, str], ...] = ()
-    """What else is sent to the robot's bridge on STOP: ``{"topic": "/lock", "type":
-    "std_msgs/Bool"}`` publishes true (and false on reset), ``{"service": "/e_stop",
-    "type": "std_srvs/Trigger"}`` is called."""
+    stop_hooks: tuple[StopHook, ...] = ()
 
 
 class Forget(msgspec.Struct, frozen=True, tag="forget"):

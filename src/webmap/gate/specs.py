@@ -1,14 +1,14 @@
 """Checks the declaration of a robot, and puts its names in one form."""
 
 import math
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.base.outline import why_no_outline
-from webmap.gate.protocol import AssistSpec, RobotSpec
+from webmap.gate.protocol import AssistSpec, RobotSpec, StopHook
 from webmap.ros.names import (
     has_gate,
     is_type,
@@ -21,74 +21,38 @@ from webmap.ros.names import (
 if TYPE_CHECKING:
     from webmap.gate.events import Key
 
-PLACES = (("topic", "std_msgs/Bool"), ("service", "std_srvs/Trigger"))
-"""What a stop hook may name, and its ROS type."""
 
-
-def checked_hooks(
-    name: str, hooks: Any, twist_topic: str | None
-) -> tuple[dict[str, str], ...]:
-    """Return the stop hooks of the robot called ``name``, with names resolved.
+def checked_hook(name: str, hook: StopHook, twist_topic: str | None) -> StopHook:
+    """Return a stop hook of the robot called ``name``, with its name resolved.
 
     Args:
         name: The name of the robot, for errors.
-        hooks: Any number of hooks, in order.
+        hook: The hook.
         twist_topic: The velocity topic, which no hook may write to.
 
     Raises:
-        ConfigError: If a hook is invalid.
+        ConfigError: If the hook is invalid.
 
     """
-    if isinstance(hooks, str | Mapping) or not isinstance(hooks, Iterable):
+    if bool(hook.topic) == bool(hook.service):
         raise ConfigError(
-            f"robot {name!r}: stop_hooks is a list of hooks, got {hooks!r}"
+            f"robot {name!r}: a stop hook has either a topic or a service, got {hook}"
         )
-    return tuple(_checked(name, hook, twist_topic) for hook in hooks)
-
-
-def place_of(hook: Mapping[str, str]) -> tuple[str, str]:
-    """Return whether a checked hook is a topic or a service, and its name."""
-    place = "topic" if "topic" in hook else "service"
-    return place, hook[place]
-
-
-def _checked(name: str, hook: Any, twist_topic: str | None) -> dict[str, str]:
-    if not isinstance(hook, Mapping):
-        raise ConfigError(
-            f"robot {name!r}: a stop hook is a table such as "
-            f"{{'topic': '/lock', 'type': 'std_msgs/Bool'}}, got {hook!r}"
-        )
-    for place, type in PLACES:
-        if place in hook and hook.keys() <= {place, "type"}:
-            return _resolved(name, hook, place, type, twist_topic)
-    raise ConfigError(
-        f"robot {name!r}: a stop hook has the key 'topic' or the key 'service', and "
-        f"besides 'type' no other, got {dict(hook)!r}"
-    )
-
-
-def _resolved(
-    name: str, hook: Mapping[str, Any], place: str, type: str, twist_topic: str | None
-) -> dict[str, str]:
-    given = hook.get("type", type)
-    if not isinstance(given, str) or not is_type(given, type):
+    place, type = "service", "std_srvs/Trigger"
+    if hook.topic:
+        place, type = "topic", "std_msgs/Bool"
+    if hook.type and not is_type(hook.type, type):
         raise ConfigError(
             f"robot {name!r}: the {place} of a stop hook is of type {type}, "
-            f"got {given!r}"
+            f"got {hook.type!r}"
         )
-    where = hook[place]
-    if not isinstance(where, str) or not where:
-        raise ConfigError(
-            f"robot {name!r}: the {place} of a stop hook is a name such as '/lock', "
-            f"got {where!r}"
-        )
-    resolved = normalise_topic(where)
+    resolved = normalise_topic(hook.name)
     if twist_topic and resolved == normalise_topic(twist_topic):
         raise ConfigError(
             f"robot {name!r}: {resolved} is the velocity topic, "
             "which cannot be a stop hook"
         )
-    return {place: resolved, "type": given}
+    return StopHook(**{place: resolved, "type": hook.type or type})
 
 
 ACTIONS = ("nav2_msgs/NavigateToPose", "move_base_msgs/MoveBaseAction")
@@ -167,7 +131,9 @@ def checked(spec: RobotSpec) -> RobotSpec:
         check_every=_number(spec, "check_every", least=1.0),
         stops_within=_number(spec, "stops_within", least=0.0),
         assist=spec.assist and checked_assist(spec.name, spec.assist),
-        stop_hooks=checked_hooks(spec.name, spec.stop_hooks, spec.twist_topic),
+        stop_hooks=tuple(
+            checked_hook(spec.name, hook, spec.twist_topic) for hook in spec.stop_hooks
+        ),
     )
 
 
