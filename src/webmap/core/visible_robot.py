@@ -261,10 +261,9 @@ class VisibleRobot(MovableRobot):
     def _set_part(self, key: str, part: Config | None, bridge: Bridge | None) -> None:
         source = self.pose_source
         if isinstance(part, OdometryConfig) and bridge is not None:
-            source.follow(bridge, part.topic, part.throttle, part.type)
+            source.follow(bridge, part)
         elif isinstance(part, TfConfig) and bridge is not None:
-            base = part.base_frame or self.base_link
-            source.place(bridge, part.map_frame, base, part.namespace, part.quiet)
+            source.place(bridge, part, self.base_link)
         elif key == "odometry":
             source.unfollow()
         elif key == "tf":

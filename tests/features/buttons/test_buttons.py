@@ -157,6 +157,14 @@ def test_all_mistakes_of_a_button_are_in_one_error():
         read_buttons([DOCK, 5])
 
 
+def test_a_button_with_confirm_asks_its_own_question_or_the_usual_one():
+    asked = {
+        confirm: read_buttons([{**DOCK, "confirm": confirm}])[0].question
+        for confirm in (False, True, " Is it free? ")
+    }
+    assert list(asked.values()) == [None, "Run “Dock”?", "Is it free?"]
+
+
 def test_more_than_a_hundred_buttons_are_refused():
     many = ({"label": f"{number}", "service": "/s"} for number in range(1000))
     with pytest.raises(ConfigError, match="button number 100: expected at most 100"):
