@@ -104,6 +104,16 @@ def test_a_check_that_a_fleet_demands_is_demanded_of_each_driven_robot():
     assert [each and each.check_every for each in found] == [43200.0, 1800.0, None]
 
 
+@pytest.mark.parametrize(
+    ("time", "seconds"), [("720h", 2592000.0), ("8784h", 31622400.0)]
+)
+def test_a_check_may_be_demanded_once_in_weeks(time, seconds):
+    mistakes = Mistakes()
+    fleet = read_fleet(tomllib.loads(CHECKED.replace("30min", time)), mistakes)
+    assert mistakes.found == []
+    assert fleet.robots[1].motion.twist.check_every == seconds
+
+
 @pytest.mark.parametrize("time", ["never", "12", "0s", "-1h", "1d", "999999h"])
 def test_a_check_that_is_demanded_within_no_time_is_a_mistake(time):
     mistakes = Mistakes()

@@ -83,7 +83,7 @@ def test_all_mistakes_in_buttons_and_other_keys_are_reported_together():
     with pytest.raises(ConfigError) as error:
         RobotConfig.from_dict({"name": "Bob", "buttons": buttons, "battery": 5})
     lines = str(error.value).splitlines()
-    assert len(lines) == 4
+    assert len(lines) == 5, "the last button has a wrong key, and no label"
     for index in (0, 1, 3):
         assert any(f"buttons[{index}]" in line for line in lines)
 

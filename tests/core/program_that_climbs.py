@@ -44,7 +44,7 @@ async def fly(base: WitnessRobot) -> None:
         try:
             bob.twist(0.05, z=0.9, rx=0.1, ry=-0.05, rz=0.2)
         except NoLease:  # busy machine: take control again
-            bob.motion.take()
+            bob.motion.commands().take(bob.id)
 
     await repeat(climb, lambda: bob.position.z > 0.2, "odometry does not climb")
     received["twists"] = [

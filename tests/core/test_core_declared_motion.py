@@ -3,7 +3,7 @@
 import pytest
 
 import webmap
-from webmap.config.buttons import ButtonSpec
+from webmap.config.buttons import ButtonConfig
 from webmap.features.buttons.robot_button import declared_motion
 
 HALL = "ws://core-buttons:9090"
@@ -38,7 +38,7 @@ def test_a_button_cannot_publish_to_a_topic_that_only_the_gate_publishes(
     setter, args, options, topic, carried
 ):
     bridge = webmap.Bridge(HALL)
-    spec = ButtonSpec("Go", "topic", topic, "std_msgs/Bool")
+    spec = ButtonConfig(label="Go", topic=topic, type="std_msgs/Bool")
     assert declared_motion(spec, HALL) is None, "no robot has the topic yet"
     robot = webmap.Robot("Bob")
     try:

@@ -7,7 +7,7 @@ import pytest
 from webmap import Map, Robot, html, svg
 from webmap.base.lifecycle import lifecycle
 from webmap.base.scope import Scope
-from webmap.config.buttons import read_button
+from webmap.config.buttons import read_buttons
 from webmap.features.buttons import robot_button
 from webmap.features.buttons.buttons import ButtonView
 from webmap.features.buttons.robot_button import RobotButton
@@ -142,7 +142,8 @@ def test_a_running_button_call_continues_when_the_page_is_closed(page, monkeypat
 
         monkeypatch.setattr(robot_button, "run", run)
         bob = Robot("Bob")
-        button = RobotButton(bob, None, read_button({"label": "D", "service": "/d"}))
+        (spec,) = read_buttons([{"label": "D", "service": "/d"}])
+        button = RobotButton(bob, None, spec)
         shown = Scope("shown")
         with shown.active():
             view = ButtonView(button, page.element("bar"))

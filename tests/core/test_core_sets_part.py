@@ -1,9 +1,19 @@
 """A wrong argument of a robot's setter is refused at the call and is not kept."""
 
+import inspect
+
+import msgspec
 import pytest
 
 from webmap import Bridge, Robot
 from webmap.base.errors import ConfigError
+from webmap.config.motion import (
+    InitialPoseConfig,
+    MoveConfig,
+    ScanAssistConfig,
+    TwistConfig,
+)
+from webmap.config.robot import OdometryConfig, TfConfig
 
 
 @pytest.fixture
@@ -111,3 +121,34 @@ def test_a_stop_distance_of_a_wrong_type_is_refused(robot):
         ConfigError, match='stop_distance: got the text "1", expected a num'
     ):
         robot.set_scan_assist("/scan", 0.3, stop_distance="1")
+
+
+SETTERS = {
+    "odometry": (Robot.set_odometry_topic, OdometryConfig),
+    "tf": (Robot.set_tf, TfConfig),
+    "twist": (Robot.set_twist_topic, TwistConfig),
+    "move": (Robot.set_move_topic, MoveConfig),
+    "initial_pose": (Robot.set_initial_pose_topic, InitialPoseConfig),
+    "scan_assist": (Robot.set_scan_assist, ScanAssistConfig),
+}
+ONLY_OF_THE_SETTER = {("initial_pose", "topic"): "/initialpose"}
+"""Defaults that a fleet file does not have: its key is the topic."""
+
+
+@pytest.mark.parametrize("key", SETTERS)
+def test_a_setter_has_the_arguments_and_the_defaults_of_the_fleet_file(key):
+    setter, part = SETTERS[key]
+    _, *parameters = inspect.signature(setter).parameters.values()
+    there = {each.name: each.default for each in parameters}
+    keys = {each.name: each for each in msgspec.structs.fields(part)}
+    assert there.keys() - {"bridge"} == keys.keys() - {"bridge"}
+    for name, default in there.items():
+        if name == "bridge" or (key, name) in ONLY_OF_THE_SETTER:
+            continue
+        field = keys[name]
+        if field.required:
+            assert default is inspect.Parameter.empty
+            continue
+        made = field.default_factory is not msgspec.NODEFAULT
+        expected = field.default_factory() if made else field.default
+        assert default == (tuple(expected) if made else expected)

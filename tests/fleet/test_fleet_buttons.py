@@ -65,7 +65,7 @@ value = 0.2
         ),
         (
             'label = "Go"\nservice = "/go"\nconfrim = true',
-            'fleet.toml:18: robots[0].buttons[1].confrim: no such key; did you mean',
+            'fleet.toml:18: robots[0].buttons[1].confrim: there is no key "confrim" ',
         ),
         (
             'label = "H"\ntopic = "/h"\ntype = "std_msgs/UInt8"\nmessage.data = 256',

@@ -6,6 +6,7 @@ import pytest
 
 from webmap.base.errors import ConfigError
 from webmap.fleet.fleet_file import prepare
+from webmap.gate.protocol import StopHook
 
 HEAD = """[bridges]
 hall = "ws://hall:9090"
@@ -36,8 +37,8 @@ def test_stop_hooks_of_the_fleet_file_reach_the_gate(tmp_path):
         + '{ service = "/e_stop", type = "std_srvs/srv/Trigger" }] }\n',
     )
     assert spec(ready).stop_hooks == (
-        {"topic": "/lock", "type": "std_msgs/Bool"},
-        {"service": "/e_stop", "type": "std_srvs/srv/Trigger"},
+        StopHook(topic="/lock", type="std_msgs/Bool"),
+        StopHook(service="/e_stop", type="std_srvs/srv/Trigger"),
     )
 
 
@@ -133,7 +134,7 @@ def test_a_footprint_with_an_invalid_outline_is_refused(tmp_path, footprint, exp
     text = f'{DRIVEN}scan_assist = {{ topic = "/scan", footprint = {footprint} }}\n'
     with pytest.raises(ConfigError, match=expected) as caught:
         check(tmp_path, text)
-    assert "robots[0].scan_assist: " in str(caught.value)
+    assert "robots[0].scan_assist.footprint: " in str(caught.value)
 
 
 def test_scan_assist_needs_a_topic_a_footprint_and_a_velocity_topic(tmp_path):

@@ -33,6 +33,9 @@ FOLDER = os.environ.get("WEBMAP_DECISIONS", "")
 
 REPORT = "SendToDisplay(message=RobotReport"
 
+HOOK = re.compile(r"StopHook\((\w+)='([^']*)', type='([^']*)'\)")
+"""A stop hook; the record has it as a table."""
+
 LENGTH = 12
 """Hexadecimal digits of a digest."""
 
@@ -78,6 +81,7 @@ class Decisions:
         line = f"{now:.6f} {event!r} {text_of(actions)}"
         # What most robots do not have is not part of the record.
         line = re.sub(r", check(ed|_every)?=None", "", line)
+        line = HOOK.sub(r"{'\1': '\2', 'type': '\3'}", line)
         if "WebMap-" in line:
             line = re.sub(r"WebMap-\w+-\d+", lambda match: self._number(match[0]), line)
         self.count += 1

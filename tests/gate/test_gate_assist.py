@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap.base.geometry import Twist
+from webmap.base.outline import polygon_around
 from webmap.gate.events import Scan
 from webmap.gate.protocol import AssistSpec
 from webmap.gate.rules.assist import assist, free_way, inside, points_of
-from webmap.gate.specs import polygon_around
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
 SPEC = AssistSpec(topic="/scan", footprint=BOX)

@@ -11,9 +11,9 @@ import pytest
 from gate_robot import eventually
 
 from webmap.base.geometry import Twist
+from webmap.base.outline import polygon_around
 from webmap.gate.display.client import GateClient
 from webmap.gate.protocol import AssistSpec, RobotReport, RobotSpec
-from webmap.gate.specs import polygon_around
 
 RADIUS = 0.25
 

@@ -13,11 +13,12 @@ from webmap.base.geometry import Twist
 from webmap.gate import actions, events, protocol
 from webmap.gate.disk import Disk, Records, path_of
 from webmap.gate.events import CheckRecord, Key
+from webmap.gate.protocol import StopHook
 from webmap.gate.rules.check import PROVED_FOR, span
 from webmap.gate.specs import checked
 
 HOUR = 3600.0
-HOOK = {"topic": "/lock", "type": "std_msgs/Bool"}
+HOOK = StopHook(topic="/lock", type="std_msgs/Bool")
 NOT_CHECKED = "not checked within 12 h"
 
 

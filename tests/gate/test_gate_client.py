@@ -13,6 +13,7 @@ from webmap.base.errors import ConfigError, MotionError, NoLease
 from webmap.base.geometry import Twist
 from webmap.gate import protocol
 from webmap.gate.display.client import GateClient
+from webmap.gate.protocol import StopHook
 
 # A gate drives in real time, and waits for most of it.
 pytestmark = [pytest.mark.slow, pytest.mark.serial]
@@ -637,8 +638,8 @@ class TestActiveStop:
         self, client, robot_spec, fake
     ):
         hooks = (
-            {"topic": "/lock", "type": "std_msgs/Bool"},
-            {"service": "/e_stop", "type": "std_srvs/Trigger"},
+            StopHook(topic="/lock", type="std_msgs/Bool"),
+            StopHook(service="/e_stop", type="std_srvs/Trigger"),
         )
         spec = msgspec.structs.replace(robot_spec, stop_hooks=hooks, action="/go")
         client.declare(spec)

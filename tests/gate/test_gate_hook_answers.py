@@ -13,9 +13,10 @@ from webmap.gate.lanes.links import Links
 from webmap.gate.lanes.navigation import answer_to
 from webmap.gate.lanes.tasks import ServiceCalls
 from webmap.gate.limits import Cap
+from webmap.gate.protocol import StopHook
 
-LOCK = {"topic": "/lock", "type": "std_msgs/Bool"}
-E_STOP = {"service": "/e_stop", "type": "std_srvs/Trigger"}
+LOCK = StopHook(topic="/lock", type="std_msgs/Bool")
+E_STOP = StopHook(service="/e_stop", type="std_srvs/Trigger")
 NO_SUCH = "Service /e_stop does not exist"
 REFUSED = f"refused ({NO_SUCH})"
 
@@ -192,7 +193,7 @@ class TestReport:
         assert bench.report().hooks == ()
 
     def test_the_report_distinguishes_a_topic_hook_from_a_service_hook(self):
-        lock = {"service": "/lock", "type": "std_srvs/Trigger"}
+        lock = StopHook(service="/lock", type="std_srvs/Trigger")
         bench = Bench().begin(spec(stop_hooks=(lock, LOCK)))
         stop(bench)
         end(bench, lock, "refused")

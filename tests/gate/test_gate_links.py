@@ -15,7 +15,7 @@ from webmap.gate.events import (
     TwistWritten,
 )
 from webmap.gate.lanes.links import Links
-from webmap.gate.protocol import AssistSpec
+from webmap.gate.protocol import AssistSpec, StopHook
 
 SLOW, ZERO = Twist(0.1), Twist()
 MOVING = {"twist": {"twist": {"linear": {"x": 0.5, "y": 0.0}, "angular": {"z": 0.0}}}}
@@ -140,7 +140,7 @@ async def test_odometry_and_goals_may_use_other_bridges_than_velocity():
             odometry_topic="/odom",
             odometry_url=b.url,
             goal_url=c.url,
-            stop_hooks=({"topic": "/lock", "type": "std_msgs/Bool"},),
+            stop_hooks=(StopHook(topic="/lock", type="std_msgs/Bool"),),
             assist=AssistSpec(topic="/scan", footprint=((0.1, 0.1), (-0.1, 0.0))),
         )
         key = noting.attach(robot)

@@ -9,7 +9,7 @@ from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
 from webmap.gate import actions, events, protocol
 from webmap.gate.events import Key
-from webmap.gate.protocol import AssistSpec
+from webmap.gate.protocol import AssistSpec, StopHook
 from webmap.gate.specs import checked, key_of
 
 
@@ -180,7 +180,7 @@ class TestSharedMachine:
     @pytest.mark.parametrize(
         "more",
         [
-            {"stop_hooks": ({"topic": "/lock", "type": "std_msgs/Bool"},)},
+            {"stop_hooks": (StopHook(topic="/lock", type="std_msgs/Bool"),)},
             {"assist": AssistSpec(topic="/scan", footprint=((1, 1), (-1, 1), (0, -1)))},
             {"odometry_topic": "/odom"},
             {"stops_within": None},

@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap.base.geometry import Twist
+from webmap.base.outline import polygon_around
 from webmap.gate.events import Scan
 from webmap.gate.protocol import AssistSpec
 from webmap.gate.rules.assist import assist
 from webmap.gate.rules.scan_geometry import ScanDirections, looks_ahead
-from webmap.gate.specs import polygon_around
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
 PART = "scan assist: the scan covers only a part of the path"

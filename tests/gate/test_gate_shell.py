@@ -14,6 +14,7 @@ from webmap.gate.events import Key, Press
 from webmap.gate.lanes.control import ControlLane
 from webmap.gate.locks import Locks
 from webmap.gate.process import Shell
+from webmap.gate.protocol import StopHook
 
 pytestmark = pytest.mark.slow
 
@@ -153,7 +154,7 @@ async def test_goals_are_cancelled_before_the_gate_ends(tmp_path, monkeypatch):
 
 @in_loop
 async def test_a_hanging_stop_hook_does_not_prevent_the_end_of_the_gate(tmp_path):
-    hook = {"service": "/e_stop", "type": "std_srvs/Trigger"}
+    hook = StopHook(service="/e_stop", type="std_srvs/Trigger")
     async with noting_bridge() as bridge, Running(tmp_path) as gate:
         bridge.answers_services = False
         gate.shell.deliver(robot(bridge, stop_hooks=(hook,)))
@@ -226,7 +227,7 @@ async def test_a_failed_gate_sends_only_zeros_while_the_page_continues_to_drive(
     tmp_path, monkeypatch
 ):
     """While the gate waits for a hook that hangs, page and display go on as before."""
-    hook = {"service": "/e_stop", "type": "std_srvs/Trigger"}
+    hook = StopHook(service="/e_stop", type="std_srvs/Trigger")
     async with driving(tmp_path, stop_hooks=(hook,)) as (bridge, gate):
         bridge.answers_services = False
         key = Key(bridge.url, "/cmd_vel")

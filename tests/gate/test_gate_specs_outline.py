@@ -8,12 +8,8 @@ from hypothesis import strategies as st
 
 from equipment.gate_harness import spec
 from webmap.base.errors import ConfigError
-from webmap.gate.specs import (
-    MOST_CORNERS,
-    checked,
-    polygon_around,
-    why_no_outline,
-)
+from webmap.base.outline import MOST_CORNERS, polygon_around, why_no_outline
+from webmap.gate.specs import checked
 from webmap.ros import names
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))

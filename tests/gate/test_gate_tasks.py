@@ -15,6 +15,7 @@ from webmap.gate.lanes.tasks import (
     goal_topics,
     hook_topics,
 )
+from webmap.gate.protocol import StopHook
 
 pytestmark = pytest.mark.slow
 
@@ -92,8 +93,8 @@ class TestTopics:
     def test_only_topic_hooks_have_a_hook_topic(self):
         robot = spec(
             stop_hooks=(
-                {"service": "/e_stop", "type": "std_srvs/Trigger"},
-                {"topic": "/lock", "type": "std_msgs/Bool"},
+                StopHook(service="/e_stop", type="std_srvs/Trigger"),
+                StopHook(topic="/lock", type="std_msgs/Bool"),
             )
         )
         assert hook_topics(robot) == [("/lock", "std_msgs/Bool")]
@@ -150,11 +151,11 @@ class TestTopicGoals:
     @in_loop
     async def test_topic_hooks_publish_flags_and_service_hooks_call_services(self):
         async with noting_bridge() as bridge, Noting(bridge.url) as noting:
-            flag = {"topic": "/lock", "type": "std_msgs/Bool"}
+            flag = StopHook(topic="/lock", type="std_msgs/Bool")
             ended = []
             noting.tasks.run_hook(flag, True, ended.append)
             noting.tasks.run_hook(flag, False, ended.append)
-            trigger = {"service": "/e_stop", "type": "std_srvs/Trigger"}
+            trigger = StopHook(service="/e_stop", type="std_srvs/Trigger")
             noting.tasks.run_hook(trigger, True, ended.append)
             await noting.calls.settle()
             await until(lambda: len(bridge.of("publish", "/lock")) == 2, "both flags")

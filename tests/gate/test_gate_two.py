@@ -13,6 +13,7 @@ from webmap.gate import actions
 from webmap.gate.disk import Disk, Records
 from webmap.gate.display.client import GateClient
 from webmap.gate.events import Key, LockState, Press, StopFileChanged, StopSaved
+from webmap.gate.protocol import StopHook
 
 ANN, BEN = Press("Ann", "a1"), Press("Ben", "b1")
 IDS = frozenset({"a1", "b1"})
@@ -46,7 +47,7 @@ class TestOwner:
         assert [w for w in owner.moving_since(at) if w.at > at] == []
 
     def test_the_owner_cancels_goals_and_runs_hooks_for_a_stop_of_the_other_gate(self):
-        hook = {"topic": "/lock", "type": "std_msgs/Bool"}
+        hook = StopHook(topic="/lock", type="std_msgs/Bool")
         bench = Bench().begin(spec(stop_hooks=(hook,)))
         bench.handle(StopFileChanged(KEY, ANN))
         assert bench.did(actions.CancelGoals)

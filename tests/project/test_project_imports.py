@@ -54,6 +54,7 @@ def test_the_motion_configuration_imports_nothing_of_the_display() -> None:
     assert ours == {
         "webmap.base",
         "webmap.base.errors",
+        "webmap.base.outline",
         "webmap.base.logs",
         "webmap.base.text",
         "webmap.config",

@@ -21,7 +21,7 @@ from websockets.sync.client import connect
 from equipment.chromium import watched_tab
 from equipment.processes import WEB, reset, running
 from webmap.gate.display.client import GateClient
-from webmap.gate.protocol import RobotSpec
+from webmap.gate.protocol import RobotSpec, StopHook
 from webmap.testing import Sentinel, WitnessRobot
 
 pytestmark = [pytest.mark.safety, pytest.mark.serial]
@@ -147,7 +147,7 @@ def simulated(folder):
             odometry_topic="/robot_0/odom",
             odometry_type="nav_msgs/msg/Odometry",
             action="/robot_0/navigate_to_pose",
-            stop_hooks=({"service": "/robot_0/stop"},),
+            stop_hooks=(StopHook(service="/robot_0/stop"),),
         ) as page,
     ):
         page.send_away(*FAR)
@@ -193,7 +193,7 @@ def test_a_hanging_goal_and_service_call_do_not_delay_the_zero_of_a_stop(folder)
             odometry_topic="/odom",
             odometry_type="nav_msgs/Odometry",
             action="/navigate_to_pose",
-            stop_hooks=({"service": "/e_stop"},),
+            stop_hooks=(StopHook(service="/e_stop"),),
         ) as page,
     ):
         page.send_away(1.0, 2.0, 0.0)

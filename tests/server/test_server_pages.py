@@ -417,7 +417,7 @@ def test_a_handler_sends_a_goal_in_the_name_of_the_page_that_was_clicked(loop):
     pages, events, sent = [], [], []
     bob = webmap.Robot("Bob")
     bob.set_move_topic(webmap.Bridge("ws://robot:9090"), "/goal")
-    bob.motion._gate = lambda: None
+    bob.motion.commands = lambda: None
     place, turn = webmap.geometry.Vector3(1.0, 2.0), webmap.geometry.Quaternion()
 
     def clicked(event):

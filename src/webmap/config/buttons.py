@@ -2,12 +2,14 @@
 
 import json
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from typing import Annotated, Any, Literal, get_args
 
 from webmap.base.errors import ConfigError
-from webmap.config.checks import KeyPath, Mistakes, did_you_mean
+from webmap.config import checks
+from webmap.config.checks import KeyPath, Mistakes, expecting
+from webmap.config.reading import Config, read
 from webmap.ros.definitions import UnknownType
 from webmap.ros.message_check import Misfit
 from webmap.ros.message_forms import checked, fields_of
@@ -16,6 +18,8 @@ from webmap.ros.names import normalise_topic, split_type
 
 ButtonKind = Literal["service", "topic", "parameter"]
 
+KINDS: tuple[ButtonKind, ...] = get_args(ButtonKind)
+
 TIMEOUT = 10.0
 """The default time for a service to answer, in seconds."""
 
@@ -23,12 +27,14 @@ LONGEST_TIMEOUT = 3600.0
 MAX_LABEL = 60
 MAX_BUTTONS = 100
 
-_COMMON = ("label", "confirm", "timeout", "form", "during_stop")
-_KEYS: dict[ButtonKind, tuple[str, ...]] = {
-    "service": (*_COMMON, "service", "type", "args"),
-    "topic": (*_COMMON, "topic", "type", "message"),
-    "parameter": (*_COMMON, "parameter", "node", "value"),
+ONLY_OF = {
+    "args": ("service",),
+    "message": ("topic",),
+    "type": ("service", "topic"),
+    "node": ("parameter",),
+    "value": ("parameter",),
 }
+"""Keys that not every button has, and the kinds of those that have them."""
 
 
 def value_kind(value: Any) -> tuple[int, str]:
@@ -65,139 +71,201 @@ def _check_number(value: Any) -> None:
         raise ConfigError("expected a whole number that fits in signed 64 bits")
 
 
-class ButtonMistake(ConfigError):
-    """A mistake in a button's configuration.
-
-    Attributes:
-        key: The key; empty if it is about the button as a whole.
-        message: The mistake.
-
-    """
-
-    def __init__(self, key: str, message: str) -> None:
-        super().__init__(f"{key}: {message}" if key else message)
-        self.key = key
-        self.message = message
+def _label(value: Any) -> str:
+    label = checks.text(value).strip()
+    if len(value) > MAX_LABEL:
+        raise ConfigError(f"at most {MAX_LABEL} characters")
+    return label
 
 
-@dataclass(frozen=True, slots=True)
-class ButtonSpec:
+def _type(value: Any) -> str:
+    split_type(value)
+    return str(value).strip()
+
+
+def _confirm(value: Any) -> bool | str:
+    if isinstance(value, bool):
+        return value
+    return checks.text(value).strip()
+
+
+def _timeout(value: Any) -> float:
+    timeout = checks.above_zero("seconds")(value)
+    if timeout > LONGEST_TIMEOUT:
+        raise ConfigError(f"at most {LONGEST_TIMEOUT:g}")
+    return float(timeout)
+
+
+class ButtonConfig(Config, kw_only=True, frozen=True):
     """What a press of one button sends to the robot, and what it shows."""
 
-    label: str
-    kind: ButtonKind
-    name: str
-    """The resolved name of the service or the topic, or the parameter's name."""
-
-    type: str | None = None
-    values: Mapping[str, Any] = field(default_factory=dict)
-    """The fields of the request or of the message; initial values of a form."""
-
-    node: str | None = None
+    label: Annotated[str, expecting(f"a text of 1 to {MAX_LABEL} characters", _label)]
+    service: Annotated[
+        str, expecting('the name of a service, such as "/dock"', normalise_topic)
+    ] = ""
+    topic: Annotated[
+        str, expecting('the name of a topic, such as "/horn"', normalise_topic)
+    ] = ""
+    parameter: Annotated[
+        str,
+        expecting("a parameter's name", lambda value: checks.text(value).strip()),
+    ] = ""
+    type: (
+        Annotated[
+            str,
+            expecting('a type, such as "std_srvs/Trigger" or "std_msgs/Bool"', _type),
+        ]
+        | None
+    ) = None
+    args: Annotated[dict[str, Any], expecting("a table of fields", checks.table)] = {}
+    """The fields of the request; initial values of a form."""
+    message: Annotated[
+        dict[str, Any], expecting("a table of fields", checks.table)
+    ] = {}
+    """The fields of the message; initial values of a form."""
+    node: (
+        Annotated[
+            str, expecting('a node, such as "/controller_server"', normalise_topic)
+        ]
+        | None
+    ) = None
     """The node of ROS 2 that has the parameter; None for a parameter of ROS 1."""
-
     value: Any = None
     """The value of the parameter."""
-
-    confirm: str | None = None
-    """The question before it acts; None without a question."""
-
-    timeout: float = TIMEOUT
+    confirm: Annotated[bool | str, expecting("true, false or a question", _confirm)] = (
+        False
+    )
+    timeout: Annotated[
+        float, expecting(f"seconds above 0, up to {LONGEST_TIMEOUT:g}", _timeout)
+    ] = TIMEOUT
     form: bool = False
     """Whether a person fills in the fields first."""
-
     during_stop: bool = False
     """Whether it also acts while STOP is active."""
 
+    @property
+    def kind(self) -> ButtonKind:
+        """What it acts on."""
+        return next(kind for kind in KINDS if getattr(self, kind))
 
-def read_buttons(data: Iterable[Mapping[str, Any]]) -> list[ButtonSpec]:
-    """Return the actions of buttons.
+    @property
+    def name(self) -> str:
+        """The resolved name of the service or the topic, or the parameter's name."""
+        return str(getattr(self, self.kind))
+
+    @property
+    def values(self) -> Mapping[str, Any]:
+        """The fields of the request or of the message."""
+        return self.args or self.message
+
+    @property
+    def question(self) -> str | None:
+        """The question before it acts; None without a question."""
+        asked = f"Run “{self.label}”?" if self.confirm is True else self.confirm
+        return asked or None
+
+    def check(self, path: KeyPath, mistakes: Mistakes) -> None:
+        """Add mistakes that concern several fields."""
+        kinds = [kind for kind in KINDS if getattr(self, kind)]
+        if len(kinds) != 1:
+            got = " and ".join(kinds) or "none of them"
+            message = f"a button has one of service, topic and parameter; got {got}"
+            mistakes.add(path, message)
+            return
+        for key, owners in ONLY_OF.items():
+            if self.kind not in owners and getattr(self, key) not in ({}, None):
+                message = f'a button with a {self.kind} has no key "{key}"'
+                mistakes.add((*path, key), message)
+                return
+        why = motion_of(self.kind, self.name, self.type)
+        if why is not None:
+            mistakes.add((*path, self.kind), why)
+        elif self.kind == "parameter":
+            self._check_value(path, mistakes)
+        else:
+            self._check_values(path, mistakes)
+
+    def _check_value(self, path: KeyPath, mistakes: Mistakes) -> None:
+        if self.value is None:
+            message = "a value is needed, also as the start of a form"
+            mistakes.add((*path, "value"), message)
+            return
+        try:
+            value_kind(self.value)
+        except ConfigError as error:
+            mistakes.add((*path, "value"), str(error))
+        if self.form and isinstance(self.value, list):
+            mistakes.add((*path, "form"), "there is no form for a list of values")
+
+    def _check_values(self, path: KeyPath, mistakes: Mistakes) -> None:
+        key = "args" if self.kind == "service" else "message"
+        if self.type is None and self.kind == "topic":
+            mistakes.add(path, 'the key "type" is missing')
+            return
+        if self.type is None and self.form:
+            mistakes.add((*path, "type"), "a form needs the type of the service")
+            return
+        try:
+            if self.type is not None:
+                with suppress(UnknownType):
+                    checked(fields_of(self.type), self.values)
+            json.dumps(self.values, allow_nan=False, ensure_ascii=False).encode()
+        except Misfit as error:
+            mistakes.add((*path, key, *error.path.split(".")), error.reason)
+        except RecursionError:
+            mistakes.add((*path, key), "it is nested too deeply")
+        except (TypeError, ValueError) as error:
+            mistakes.add((*path, key), f"it cannot be written as JSON: {error}")
+
+
+def read_buttons(buttons: Iterable[Any]) -> list[ButtonConfig]:
+    """Return the configurations of buttons.
 
     Raises:
-        ConfigError: If one is not valid, or two have the same label.
+        ConfigError: If one is not valid, or two have the same label; the error names
+            the button and lists its mistakes.
 
     """
-    specs: list[ButtonSpec] = []
-    for number, each in enumerate(data):
-        if len(specs) == MAX_BUTTONS:
-            raise ConfigError(f"expected at most {MAX_BUTTONS} buttons, got more")
-        try:
-            spec = read_button(each)
-        except ButtonMistake as error:
-            label = each.get("label") if isinstance(each, Mapping) else None
-            of = f"{label!r}" if isinstance(label, str) else f"number {number}"
-            raise ConfigError(f"button {of}: {error}") from None
-        if any(spec.label == other.label for other in specs):
-            raise ConfigError(f"two buttons have the label {spec.label!r}")
-        specs.append(spec)
-    return specs
+    found = []
+    for number, (button, mistakes) in enumerate(_each_button(buttons)):
+        label = button and button.label
+        mistakes.refuse(f"button {label!r}" if label else f"button number {number}")
+        assert button is not None, "a table without a mistake is a button"
+        found.append(button)
+    return found
 
 
 def check_buttons(buttons: Iterable[Any], path: KeyPath, mistakes: Mistakes) -> None:
     """Add all mistakes in buttons.
 
     Args:
-        buttons: A table for each.
+        buttons: A table for each button.
         path: The path of the list.
         mistakes: The list for every mistake.
 
     """
-    first: dict[str, int] = {}
-    for index, each in enumerate(buttons):
-        try:
-            label = read_button(each).label
-        except ButtonMistake as error:
-            key = tuple(part for part in error.key.split(".") if part)
-            mistakes.add((*path, index, *key), error.message)
-            continue
-        if first.setdefault(label, index) != index:
-            message = f'got "{label}", expected a label that no other button has'
-            mistakes.add((*path, index, "label"), message)
+    for index, (_, found) in enumerate(_each_button(buttons)):
+        mistakes.take((*path, index), found)
 
 
-def read_button(data: Mapping[str, Any]) -> ButtonSpec:
-    """Return the action of one button.
-
-    Raises:
-        ButtonMistake: If it is not valid, or would move a robot.
-
-    """
-    if not isinstance(data, Mapping):
-        raise ButtonMistake("", f"got {data!r}, expected a table of keys and values")
-    kinds: list[ButtonKind] = [kind for kind in _KEYS if kind in data]
-    if len(kinds) != 1:
-        got = " and ".join(kinds) or "none of them"
-        raise ButtonMistake(
-            "", f"a button has one of service, topic and parameter; got {got}"
-        )
-    kind = kinds[0]
-    for key in data:
-        if key not in _KEYS[kind]:
-            hint = did_you_mean(key, _KEYS[kind])
-            listed = ", ".join(_KEYS[kind])
-            raise ButtonMistake(str(key), f"no such key{hint}; there are {listed}")
-    form = _flag(data, "form")
-    spec = ButtonSpec(
-        label=_label(data),
-        kind=kind,
-        name=_name(data, kind),
-        type=_type(data, kind),
-        values=_table(data, "args" if kind == "service" else "message"),
-        node=_node(data),
-        value=data.get("value"),
-        confirm=_confirm(data),
-        timeout=_timeout(data),
-        form=form,
-        during_stop=_flag(data, "during_stop"),
-    )
-    why = motion_of(spec.kind, spec.name, spec.type)
-    if why is not None:
-        raise ButtonMistake(kind, why)
-    if kind == "parameter":
-        _check_value(spec)
-    else:
-        _check_values(spec)
-    return spec
+def _each_button(
+    buttons: Iterable[Any],
+) -> Iterator[tuple[ButtonConfig | None, Mistakes]]:
+    """Yield each button with its mistakes; it is unusable if there are any."""
+    labels: set[str] = set()
+    for number, each in enumerate(buttons):
+        mistakes = Mistakes()
+        if number == MAX_BUTTONS:
+            mistakes.add((), f"expected at most {MAX_BUTTONS} buttons, got more")
+            yield None, mistakes
+            return
+        button = read(ButtonConfig, each, (), mistakes)
+        if button is not None and button.label in labels:
+            message = f'got "{button.label}", expected a label that no other button has'
+            mistakes.add(("label",), message)
+        elif button is not None and not mistakes.count:
+            labels.add(button.label)
+        yield button, mistakes
 
 
 def motion_of(kind: ButtonKind, name: str, type: str | None) -> str | None:
@@ -222,123 +290,3 @@ def motion_of(kind: ButtonKind, name: str, type: str | None) -> str | None:
         f"{what} carries {moved}, which only the gate sends, by driving, by a goal or "
         "by STOP: remove this button"
     )
-
-
-def _label(data: Mapping[str, Any]) -> str:
-    label = data.get("label")
-    if not isinstance(label, str) or not label.strip() or len(label) > MAX_LABEL:
-        raise ButtonMistake(
-            "label", f"got {label!r}, expected a text of 1 to {MAX_LABEL} characters"
-        )
-    return label.strip()
-
-
-def _name(data: Mapping[str, Any], kind: ButtonKind) -> str:
-    name = data[kind]
-    if kind == "parameter":
-        if not isinstance(name, str) or not name.strip():
-            raise ButtonMistake(kind, f"got {name!r}, expected a parameter's name")
-        return name.strip()
-    try:
-        return normalise_topic(name)
-    except ConfigError:
-        what = "service" if kind == "service" else "topic"
-        raise ButtonMistake(
-            kind, f'got {name!r}, expected the name of a {what}, such as "/dock"'
-        ) from None
-
-
-def _type(data: Mapping[str, Any], kind: ButtonKind) -> str | None:
-    type = data.get("type")
-    if type is None and kind != "topic":
-        return None
-    try:
-        split_type(type)  # type: ignore[arg-type]  # refuses values that are not text
-    except ConfigError:
-        example = "std_msgs/Bool" if kind == "topic" else "std_srvs/Trigger"
-        raise ButtonMistake(
-            "type", f'got {type!r}, expected a type, such as "{example}"'
-        ) from None
-    return str(type).strip()
-
-
-def _table(data: Mapping[str, Any], key: str) -> Mapping[str, Any]:
-    table = data.get(key, {})
-    if not isinstance(table, Mapping):
-        raise ButtonMistake(key, f"got {table!r}, expected a table of fields")
-    return dict(table)
-
-
-def _node(data: Mapping[str, Any]) -> str | None:
-    node = data.get("node")
-    if node is None:
-        return None
-    try:
-        return normalise_topic(node)
-    except ConfigError:
-        raise ButtonMistake(
-            "node", f'got {node!r}, expected a node, such as "/controller_server"'
-        ) from None
-
-
-def _confirm(data: Mapping[str, Any]) -> str | None:
-    confirm = data.get("confirm", False)
-    if isinstance(confirm, str) and confirm.strip():
-        return confirm.strip()
-    if not isinstance(confirm, bool):
-        raise ButtonMistake(
-            "confirm", f"got {confirm!r}, expected true, false or a question"
-        )
-    return f"Run “{_label(data)}”?" if confirm else None
-
-
-def _timeout(data: Mapping[str, Any]) -> float:
-    timeout = data.get("timeout", TIMEOUT)
-    number = isinstance(timeout, int | float) and not isinstance(timeout, bool)
-    if not number or not 0 < timeout <= LONGEST_TIMEOUT:
-        raise ButtonMistake(
-            "timeout",
-            f"got {timeout!r}, expected seconds above 0, up to {LONGEST_TIMEOUT:g}",
-        )
-    return float(timeout)
-
-
-def _flag(data: Mapping[str, Any], key: str) -> bool:
-    flag = data.get(key, False)
-    if not isinstance(flag, bool):
-        raise ButtonMistake(key, f"got {flag!r}, expected true or false")
-    return flag
-
-
-def _check_values(spec: ButtonSpec) -> None:
-    key = "args" if spec.kind == "service" else "message"
-    if spec.type is None:
-        if spec.form:
-            raise ButtonMistake("type", "a form needs the type of the service")
-        fields = None
-    else:
-        try:
-            fields = fields_of(spec.type)
-        except UnknownType:
-            fields = None
-    try:
-        if fields is not None:
-            checked(fields, spec.values)
-        json.dumps(spec.values, allow_nan=False, ensure_ascii=False).encode()
-    except Misfit as error:
-        raise ButtonMistake(f"{key}.{error.path}", error.reason) from None
-    except RecursionError:
-        raise ButtonMistake(key, "it is nested too deeply") from None
-    except (TypeError, ValueError) as error:
-        raise ButtonMistake(key, f"it cannot be written as JSON: {error}") from None
-
-
-def _check_value(spec: ButtonSpec) -> None:
-    if spec.value is None:
-        raise ButtonMistake("value", "a value is needed, also as the start of a form")
-    try:
-        value_kind(spec.value)
-    except ConfigError as error:
-        raise ButtonMistake("value", str(error)) from None
-    if spec.form and isinstance(spec.value, list):
-        raise ButtonMistake("form", "there is no form for a list of values")

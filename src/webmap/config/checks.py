@@ -25,7 +25,10 @@ MOST_MISTAKES = 100
 """How many mistakes are reported in full; the rest are only counted."""
 
 LARGEST = 1e6
-"""The greatest speed, time or length."""
+"""The greatest speed, length or time of a robot, such as a command timeout."""
+
+LONGEST_TIME = 366 * 86400.0
+"""The greatest time until a check before driving is due again, in seconds."""
 
 LONGEST_NAME = 100
 """The greatest length of a name, for lists, in characters."""
@@ -160,12 +163,20 @@ def any_text(value: Any) -> str:
     return value
 
 
-def bridge(value: Any) -> str:
-    """Check the name or the URL of a bridge."""
-    try:
-        return text(value)
-    except ConfigError:
-        raise ConfigError("the name or the address of a bridge") from None
+def expecting(expected: str, check: Check) -> Check:
+    """Return a check whose error has this text about the expected value."""
+
+    def worded(value: Any) -> Any:
+        try:
+            return check(value)
+        except ConfigError:
+            raise ConfigError(expected) from None
+
+    return worded
+
+
+bridge = expecting("the name or the address of a bridge", text)
+"""Checks the name or the URL of a bridge."""
 
 
 def is_name(text: str) -> bool:
@@ -186,12 +197,8 @@ def name(value: Any) -> str:
     return plain
 
 
-def topic(value: Any) -> str:
-    """Check the name of a topic, and return it in canonical form."""
-    try:
-        return normalise_topic(value)
-    except ConfigError:
-        raise ConfigError('the name of a topic, such as "/odom"') from None
+topic = expecting('the name of a topic, such as "/odom"', normalise_topic)
+"""Checks the name of a topic, and returns it in canonical form."""
 
 
 def frame(value: Any) -> str:
@@ -213,60 +220,72 @@ def message_type(*allowed: str) -> Check:
     return check
 
 
-def _number(value: Any) -> bool:
-    """Return whether a value is a number within limits; NaN and infinity are not."""
-    real = isinstance(value, Real) and not isinstance(value, bool)
-    return real and abs(value) <= LARGEST
-
-
-def _most(value: Any) -> str:
-    """Return the limit of numbers for an error message, if this one is larger."""
-    real = isinstance(value, Real) and not isinstance(value, bool)
-    return f", at most {LARGEST:g}" if real and LARGEST < value < math.inf else ""
-
-
 def above_zero(unit: str) -> Check:
     """Return a check for a finite number above zero."""
-
-    def check(value: Any) -> float:
-        if not _number(value) or not value > 0:
-            raise ConfigError(f"a number of {unit} above 0{_most(value)}")
-        return float(value)
-
-    return check
+    expected = f"a number of {unit} above 0"
+    return _number(expected, lambda value: value > 0, names_limit=True)
 
 
 def from_zero(unit: str) -> Check:
     """Return a check for a finite number of 0 or more."""
-
-    def check(value: Any) -> float:
-        if not _number(value) or value < 0:
-            raise ConfigError(f"a number of {unit} from 0 on{_most(value)}")
-        return float(value)
-
-    return check
+    expected = f"a number of {unit} from 0 on"
+    return _number(expected, lambda value: value >= 0, names_limit=True)
 
 
 def finite(expected: str) -> Check:
     """Return a check for any finite number within the limits."""
-
-    def check(value: Any) -> float:
-        if not _number(value):
-            raise ConfigError(expected)
-        return float(value)
-
-    return check
+    return _number(expected, lambda value: True)
 
 
 def between(low: float, high: float, unit: str) -> Check:
     """Return a check for a finite number within both limits, which are included."""
+    expected = f"a number of {unit} from {low:g} to {high:g}"
+    return _number(expected, lambda value: low <= value <= high)
+
+
+def _number(
+    expected: str, fits: Callable[[float], bool], *, names_limit: bool = False
+) -> Check:
+    """Return a check for a number that is at most :data:`LARGEST`.
+
+    Args:
+        expected: The expected number, for the error.
+        fits: Returns whether a finite number is one of those.
+        names_limit: Whether the error for a larger number also has the limit.
+
+    """
 
     def check(value: Any) -> float:
-        if not _number(value) or not low <= value <= high:
-            raise ConfigError(f"a number of {unit} from {low:g} to {high:g}")
-        return float(value)
+        real = _is_real(value)
+        if real and abs(value) <= LARGEST and fits(value):
+            return float(value)
+        too_large = names_limit and real and LARGEST < value < math.inf
+        most = f", at most {LARGEST:g}" if too_large else ""
+        raise ConfigError(f"{expected}{most}")
 
     return check
+
+
+def numbers(count: int, number: Check) -> Check:
+    """Return a check for a sequence of so many numbers, each with its own check."""
+
+    def check(value: Any) -> tuple[float, ...]:
+        given = tuple(map(number, items(value)))
+        if len(given) != count:
+            raise ConfigError(f"{count} numbers")
+        return given
+
+    return check
+
+
+def items(value: Any) -> Iterable[Any]:
+    """Return the items of a list, a tuple or a numpy array; other values have none."""
+    many = isinstance(value, Iterable) and not isinstance(value, str | Mapping)
+    return value if many else ()
+
+
+def _is_real(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def whole(low: int, high: int) -> Check:
@@ -299,7 +318,7 @@ def duration(value: Any) -> float:
     if isinstance(value, str):
         found = re.fullmatch(r"(\d{1,9}(?:\.\d{1,9})?) ?(s|min|h)", value)
         seconds = float(found[1]) * _UNITS[found[2]] if found else None
-    if not _number(seconds) or not 1 <= seconds <= 366 * 86400:
+    if not _is_real(seconds) or not 1 <= seconds <= LONGEST_TIME:
         raise ConfigError('a time from 1 s to 366 days, such as "12h" or "30min"')
     return float(seconds)
 

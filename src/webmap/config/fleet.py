@@ -23,14 +23,9 @@ from webmap.config.robot import (
 )
 from webmap.ros.names import is_agent_url, normalise_url
 
-
-def _address(value: Any) -> str:
-    try:
-        return normalise_url(value)
-    except ConfigError:
-        raise ConfigError(
-            'the address of a bridge, such as "ws://robot:9090"'
-        ) from None
+_address = checks.expecting(
+    'the address of a bridge, such as "ws://robot:9090"', normalise_url
+)
 
 
 class BridgeConfig(Config, kw_only=True, frozen=True):

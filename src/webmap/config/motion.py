@@ -4,13 +4,13 @@ It needs no display, so a process that only moves robots can import it.
 """
 
 import math
-from collections.abc import Iterable, Mapping
 from numbers import Real
 from typing import Annotated, Any, ClassVar, Literal
 
 import msgspec
 
 from webmap.base.errors import ConfigError
+from webmap.base.outline import Point, polygon_around, why_no_outline
 from webmap.config import checks
 from webmap.config.checks import KeyPath, Mistakes
 from webmap.config.reading import Config
@@ -37,47 +37,30 @@ class TopicConfig(Config, frozen=True):
         return {"topic": value}
 
 
-def _hook_name(value: Any) -> str:
-    try:
-        return normalise_topic(value)
-    except ConfigError:
-        raise ConfigError('a name, such as "/lock"') from None
+_hook_name = checks.expecting('a name, such as "/lock"', normalise_topic)
+
+_covariance = checks.expecting(
+    "three numbers from 0 on: the variances of x and y in m², of yaw in rad², such as "
+    "[0.25, 0.25, 0.068]",
+    checks.numbers(3, checks.from_zero("m²")),
+)
 
 
-def _covariance(value: Any) -> tuple[float, ...]:
-    numbers = [] if isinstance(value, str) else list(_each(value))
-    number = checks.from_zero("m²")
-    try:
-        if len(numbers) == 3:
-            return tuple(number(each) for each in numbers)
-    except ConfigError:
-        pass
-    raise ConfigError(
-        "three numbers from 0 on: the variances of x and y in m², of yaw in rad², "
-        "such as [0.25, 0.25, 0.068]"
-    )
+def _size(value: Any) -> float | list[Point]:
+    if isinstance(value, Real):
+        return float(checks.above_zero("metres")(value))
+    corner = checks.numbers(2, checks.finite("a number of metres"))
+    corners = [corner(each) for each in checks.items(value)]
+    if len(corners) < 3:
+        raise ConfigError("3 corners or more")
+    return [(x, y) for x, y in corners]
 
 
-def _footprint(value: Any) -> float | list[tuple[float, float]]:
-    radius, number = checks.above_zero("metres"), checks.finite("a number of metres")
-    try:
-        if isinstance(value, Real):
-            return float(radius(value))
-        corners = [tuple(map(number, _each(corner))) for corner in _each(value)]
-        if len(corners) >= 3 and all(len(corner) == 2 for corner in corners):
-            return [(x, y) for x, y in corners]
-    except ConfigError:
-        pass
-    raise ConfigError(
-        "the robot's radius in metres, above 0, or 3 corners of its outline or "
-        "more, such as [[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2]]"
-    )
-
-
-def _each(value: Any) -> Iterable[Any]:
-    """Return the items of a list, a tuple or a numpy array; other values have none."""
-    many = isinstance(value, Iterable) and not isinstance(value, str | Mapping)
-    return value if many else ()
+_footprint = checks.expecting(
+    "the robot's radius in metres, above 0, or 3 corners of its outline or more, such "
+    "as [[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2]]",
+    _size,
+)
 
 
 class StopHook(Config, kw_only=True, frozen=True):
@@ -193,7 +176,7 @@ class ScanAssistConfig(Config, kw_only=True, frozen=True):
 
     topic: Annotated[str, checks.topic]
     """A topic of type ``sensor_msgs/LaserScan``, on the bridge of the velocity."""
-    footprint: Annotated[float | list[tuple[float, float]], _footprint]
+    footprint: Annotated[float | list[Point], _footprint]
     """The robot's radius, or its corners in its own frame, in order, in metres."""
     x: Annotated[float, checks.finite("a number of metres")] = 0.0
     """The scanner's position, forward of the base."""
@@ -217,9 +200,21 @@ class ScanAssistConfig(Config, kw_only=True, frozen=True):
     """The speed when creeping."""
 
     @property
-    def yaw(self) -> float:
-        """The scanner's direction, in radians."""
-        return math.radians(self.angle)
+    def sensor(self) -> tuple[float, float, float]:
+        """The pose of the scanner on the robot: x, y in metres, yaw in radians."""
+        return (self.x, self.y, math.radians(self.angle))
+
+    @property
+    def corners(self) -> tuple[Point, ...]:
+        """The corners of the robot, around its disc if the footprint is a radius."""
+        size = self.footprint
+        return polygon_around(size) if isinstance(size, float) else tuple(size)
+
+    def check(self, path: KeyPath, mistakes: Mistakes) -> None:
+        """Add mistakes that concern several fields."""
+        why = why_no_outline(self.corners)
+        if why is not None:
+            mistakes.add((*path, "footprint"), why)
 
 
 class MotionConfig(Config, kw_only=True, frozen=True):

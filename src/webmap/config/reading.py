@@ -154,6 +154,21 @@ def read_part(
     return part
 
 
+def tables_of(cls: type[Config], *keys: str) -> dict[str, type[Config]]:
+    """Return the classes of the fields that are tables, by the names of the fields.
+
+    Args:
+        cls: The class.
+        keys: The fields; all of the class if left out, which must be tables.
+
+    """
+    hints = get_type_hints(cls)
+    return {
+        key: next(each for each in get_args(hints[key]) if each is not types.NoneType)
+        for key in keys or cls.__struct_fields__
+    }
+
+
 def unknown(
     key: object, known: Iterable[str], path: KeyPath, mistakes: Mistakes
 ) -> None:

@@ -14,7 +14,7 @@ from webmap.config import checks
 from webmap.config.buttons import check_buttons
 from webmap.config.checks import KeyPath, Mistakes
 from webmap.config.motion import MotionConfig, TopicConfig
-from webmap.config.reading import ONE_OR_MORE, Config, ReadBy, read
+from webmap.config.reading import ONE_OR_MORE, Config, ReadBy, read, tables_of
 from webmap.ros.image_address import EXAMPLE, parse_address
 from webmap.ros.names import is_topic
 
@@ -29,9 +29,6 @@ ODOMETRY_TYPES = (
 
 MOTION = tuple(MotionConfig.__struct_fields__)
 """Keys of a robot's table that are parts of its motion."""
-
-LINKED = ("odometry", "tf", "twist", "move", "initial_pose")
-"""Parts that use a bridge."""
 
 
 class OdometryConfig(TopicConfig, kw_only=True, frozen=True):
@@ -90,10 +87,7 @@ class PictureConfig(Config, kw_only=True, frozen=True):
 
 
 def _address(value: Any) -> str:
-    try:
-        parse_address(value)
-    except ConfigError:
-        raise ConfigError(f'the address of a camera, such as "{EXAMPLE}"') from None
+    parse_address(value)
     return str(value)
 
 
@@ -101,7 +95,10 @@ class CameraConfig(Config, kw_only=True, frozen=True):
     """One camera: a topic, or a URL."""
 
     topic: Annotated[str, checks.topic] = ""
-    url: Annotated[str, _address] = ""
+    url: Annotated[
+        str,
+        checks.expecting(f'the address of a camera, such as "{EXAMPLE}"', _address),
+    ] = ""
     name: Annotated[str, checks.text] = ""
     """Numbered if not given."""
     throttle: Annotated[int, checks.milliseconds] | None = None
@@ -146,18 +143,14 @@ class ModuleEntry(NamedTuple):
     module: ModuleConfig
 
 
-def _alignment(value: Any) -> tuple[float, ...]:
-    expected = (
+Alignment = Annotated[
+    tuple[float, float, float],
+    checks.expecting(
         "x and y in metres and an angle in degrees, counter-clockwise, such as "
-        "[12.5, -3.0, 90.0]"
-    )
-    number = checks.finite(expected)
-    if not isinstance(value, list | tuple) or len(value) != 3:
-        raise ConfigError(expected)
-    return tuple(number(each) for each in value)
-
-
-Alignment = Annotated[tuple[float, float, float], _alignment]
+        "[12.5, -3.0, 90.0]",
+        checks.numbers(3, checks.finite("a number")),
+    ),
+]
 """The pose of a map on the common one: metres, metres, and degrees
 counter-clockwise."""
 
@@ -183,13 +176,6 @@ OWN_CLASSES = ("robot", "unplaced", "selected", "stale")
 
 BATTERY_LOW = 0.2
 """The usual charge below which a battery is low."""
-
-
-def _charge(value: Any) -> float:
-    try:
-        return float(checks.between(0, 1, "")(value))
-    except ConfigError:
-        raise ConfigError("a charge from 0 to 1, such as 0.2 for 20 %") from None
 
 
 def _css_class(value: Any) -> str:
@@ -224,7 +210,12 @@ class RobotConfig(Config, kw_only=True, frozen=True):
     """Topics of type ``sensor_msgs/LaserScan``, drawn under the robot's body."""
     battery: Annotated[str, checks.topic] = ""
     """A topic of type ``sensor_msgs/BatteryState``."""
-    battery_low: Annotated[float, _charge] = BATTERY_LOW
+    battery_low: Annotated[
+        float,
+        checks.expecting(
+            "a charge from 0 to 1, such as 0.2 for 20 %", checks.between(0, 1, "")
+        ),
+    ] = BATTERY_LOW
     """The charge below which the battery is low, from 0 to 1."""
     tags: Annotated[list[Annotated[str, checks.name]], ONE_OR_MORE] = []
     """Words by which the list of robots is grouped; the first one is the group."""
@@ -340,6 +331,13 @@ class RobotConfig(Config, kw_only=True, frozen=True):
         return layers + [
             ModuleEntry(("modules", index), module) for index, module in listed
         ]
+
+
+PARTS = tables_of(RobotConfig, "odometry", "tf") | tables_of(MotionConfig)
+"""The parts of a robot that are no modules, by their keys."""
+
+LINKED = tuple(key for key, part in PARTS.items() if "bridge" in part.__struct_fields__)
+"""Parts that use a bridge."""
 
 
 def read_robot(value: Any, path: KeyPath, mistakes: Mistakes) -> RobotConfig | None:

@@ -27,7 +27,7 @@ EXPECTED = "expected TOML with a table [bridges] and a table [[robots]] for each
 DEEPEST = 20
 """The greatest number of parts of a key, and of nested brackets."""
 
-_STRING = (
+_STRING = (  # up to two quotes before the three that end a text belong to it
     r'"""(?:\\.|[^\\])*?""""{0,2}'
     r"|'''.*?''''{0,2}"
     r'|"(?:\\.|[^"\\\n])*"'
@@ -65,13 +65,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _SPACE = re.compile(r"[ \t]*")
 _GAP = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
 _PLAIN = re.compile(r"[^,\]}#\n]*")
-_TEXT = re.compile(
-    r'"""(?:\\.|[^\\])*?"""(?:"{0,2}(?!"))'
-    r"|'''.*?'''(?:'{0,2}(?!'))"
-    r'|"(?:\\.|[^"\\\n])*"'
-    r"|'[^'\n]*'",
-    re.DOTALL,
-)
+_TEXT = re.compile(_STRING, re.DOTALL)
 
 
 class FleetText:

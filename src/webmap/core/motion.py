@@ -2,18 +2,15 @@
 
 import hashlib
 import logging
-import math
 import time
 from collections import Counter
-from collections.abc import Mapping
-from concurrent.futures import Future
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import msgspec
 
 from webmap.base.errors import ConfigError, MotionError
-from webmap.base.geometry import Pose, Twist
+from webmap.base.geometry import Pose
 from webmap.base.lifecycle import lifecycle
 from webmap.base.tasks import spawn
 from webmap.config.checks import Mistakes, same_name
@@ -25,12 +22,12 @@ from webmap.config.motion import (
     ScanAssistConfig,
     TwistConfig,
 )
-from webmap.config.reading import Config, read_part
+from webmap.config.reading import Config
 from webmap.core.robot_names import named_robots
 from webmap.gate.limits import PLANE, Axes
-from webmap.gate.protocol import AssistSpec, RobotReport, RobotSpec
+from webmap.gate.protocol import AssistSpec, RobotReport, RobotSpec, StopHook
 from webmap.gate.rules.obedience import MOST_NAME, MOST_NODES
-from webmap.gate.specs import checked, checked_assist, polygon_around
+from webmap.gate.specs import checked
 from webmap.poses.odometry import TypeQuery
 from webmap.ros.bridge import Bridge
 from webmap.ros.motion_topics import STOP
@@ -38,21 +35,12 @@ from webmap.ros.names import is_agent_url, is_type
 
 if TYPE_CHECKING:
     from webmap.agents.gates import Gates
-    from webmap.core.base_page import BasePage
     from webmap.gate.display.client import GateClient
 
 log = logging.getLogger("webmap.robot")
 
 ASK_WRITERS = 10.0
 """Seconds between two queries of a bridge for other publishers of velocities."""
-
-PARTS: dict[str, type[Config]] = {
-    "twist": TwistConfig,
-    "move": MoveConfig,
-    "initial_pose": InitialPoseConfig,
-    "scan_assist": ScanAssistConfig,
-}
-"""The parts of a robot's motion."""
 
 WRITING = ("twist", "move", "initial_pose")
 """The parts that the gate writes for; the first one of a robot sets its bridge."""
@@ -140,8 +128,8 @@ def _axes(twist: TwistConfig | None) -> Axes:
 class RobotMotion:
     """The gate's description of one robot, updated as topics change.
 
-    It also passes the robot's commands to the gate. Nothing here writes to a robot; the
-    gate decides.
+    The robot's commands go to the gate of :meth:`commands`. Nothing here writes to a
+    robot; the gate decides.
     """
 
     agent: str = ""
@@ -180,25 +168,19 @@ class RobotMotion:
         links = (self._bridges.get(key) for key in WRITING)
         return any(link is not None and is_agent_url(link.url) for link in links)
 
-    def set(
-        self, key: str, values: Mapping[str, Any] | None, bridge: Bridge | None = None
-    ) -> None:
+    def set(self, key: str, part: Config | None, bridge: Bridge | None = None) -> None:
         """Set or clear one part of the configuration.
 
         Args:
             key: The part, a field of ``MotionConfig``.
-            values: The part's plain values; None clears the part. An empty value counts
-                as left out where that is the default.
+            part: The part, whose values are valid; None clears the part.
             bridge: The bridge of the part, if it has one.
 
         Raises:
-            ConfigError: If a value is not valid; the message lists every mistake.
+            ConfigError: If the part does not fit the others, or the gate cannot move
+                robots behind the bridge.
 
         """
-        part = None
-        if values is not None:
-            url = "" if bridge is None else bridge.url
-            part = read_part(PARTS[key], key, values, f"robot {self._name!r}", url)
         config = msgspec.structs.replace(self.config, **{key: part})
         bridges = {**self._bridges, key: bridge}
         if part is not None:
@@ -278,8 +260,6 @@ class RobotMotion:
         mistakes = Mistakes()
         config.check((), mistakes)
         mistakes.refuse(f"robot {self._name!r}")
-        if config.scan_assist is not None:
-            checked_assist(self._name, _assist(config.scan_assist))
         spec = self._spec(config, bridges)
         if spec is not None:
             checked(spec)
@@ -293,7 +273,10 @@ class RobotMotion:
         driven: dict[str, Any] = {}
         if twist is not None:
             driven = {name: getattr(twist, name) for name in OF_BASE}
-            driven["stop_hooks"] = tuple(map(msgspec.to_builtins, twist.stop_hooks))
+            driven["stop_hooks"] = tuple(
+                StopHook(topic=hook.topic, service=hook.service, type=hook.type)
+                for hook in twist.stop_hooks
+            )
             driven["twist_topic"] = twist.topic
             if config.scan_assist is not None:
                 driven["assist"] = _assist(config.scan_assist)
@@ -352,56 +335,22 @@ class RobotMotion:
         robot_motions.discard(self)
         named_robots.pop(self.id, None)
 
-    def take(self) -> "Future[int]":
-        """Request control for this program."""
-        return self._gate().take(self.id)
-
-    def release(self) -> None:
-        """Release the program's control; the robot is stopped."""
-        self._gate().release(self.id)
-
-    def twist(self, twist: Twist) -> None:
-        """Send the gate one velocity command of this program.
+    def commands(self) -> "Gates | GateClient":
+        """Return the gate, for a command to this robot.
 
         Raises:
-            MotionError: If the twist topic has no limit for an axis of the command.
+            MotionError: If WebMap is not started, or nothing moves the robot.
 
         """
-        gate = self._gate()
-        if why := self.axes.refusal(twist):
-            raise MotionError(f"robot {self._name!r}: the velocity was not sent: {why}")
-        gate.twist(self.id, twist)
-
-    def move(self, x: float, y: float, yaw: float, by: "BasePage | None") -> None:
-        """Send the gate one goal, of this program or in the name of a page."""
-        gate = self._gate()
-        if by is None:
-            gate.move(self.id, x, y, yaw)
-        else:
-            by.move(self.id, x, y, yaw)
-
-    def locate(self, x: float, y: float, yaw: float) -> None:
-        """Send the gate the robot's pose, from this program."""
-        self._gate().locate(self.id, x, y, yaw)
-
-    def cancel(self) -> None:
-        """Cancel the robot's goals through the gate."""
-        self._gate().cancel(self.id)
-
-    def stop(self) -> None:
-        """Stop the robot through the gate, no matter who has control."""
-        self._gate().stop_robot(self.id)
-
-    def reset_stop(self, report: RobotReport | None) -> None:
-        """End the STOP in a report through the gate."""
-        gate = self._gate()
-        stop = None if report is None else report.stop
-        if stop is None:
+        if self.gate is None or not lifecycle.running:
             raise MotionError(
-                f"robot {self._name!r}: its report has no STOP to reset; after stop(), "
-                "wait until report.stop is set"
+                f"robot {self._name!r} cannot be moved before webmap.start()"
             )
-        gate.reset(self.id, stop.id)
+        if not any(getattr(self.config, key) for key in WRITING):
+            raise MotionError(
+                f"robot {self._name!r} has no twist topic and no move topic"
+            )
+        return self.gate
 
     def on_report(self, report: RobotReport) -> None:
         """Query the names of other publishers while another program is driving."""
@@ -419,17 +368,6 @@ class RobotMotion:
             sound = [name[:MOST_NAME] for name in others if name.isprintable()]
             self.writers = tuple(sound[:MOST_NODES])
             self.gate.name_writers(self.id, tuple(others))
-
-    def _gate(self) -> "Gates | GateClient":
-        if self.gate is None or not lifecycle.running:
-            raise MotionError(
-                f"robot {self._name!r} cannot be moved before webmap.start()"
-            )
-        if not any(getattr(self.config, key) for key in WRITING):
-            raise MotionError(
-                f"robot {self._name!r} has no twist topic and no move topic"
-            )
-        return self.gate
 
     def _take_type(self, found: str) -> None:
         twist = self.config.twist
@@ -475,12 +413,10 @@ def _goal_type(move: MoveConfig | None, name: str) -> str:
 
 def _assist(config: ScanAssistConfig) -> AssistSpec:
     """Return the gate's form of scan assist: a radius becomes corners."""
-    size = config.footprint
-    corners = polygon_around(size) if isinstance(size, float) else tuple(size)
     return AssistSpec(
         topic=config.topic,
-        footprint=corners,
-        sensor=(config.x, config.y, math.radians(config.angle)),
+        footprint=config.corners,
+        sensor=config.sensor,
         upside_down=config.upside_down,
         frame=config.frame,
         stop_distance=config.stop_distance,

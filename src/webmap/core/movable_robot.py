@@ -5,13 +5,22 @@ import functools
 import inspect
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Concatenate, Literal, ParamSpec, TypeVar
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    ClassVar,
+    Concatenate,
+    Literal,
+    ParamSpec,
+    TypeVar,
+)
 
 from webmap.base.errors import ConfigError, MotionError
 from webmap.base.geometry import Orientation, Position, Quaternion, Twist
 from webmap.base.scope import no_scope
-from webmap.config.motion import COVARIANCE, NAVIGATE_TO_POSE
-from webmap.config.robot import LINKED, MOTION
+from webmap.config.motion import COVARIANCE, NAVIGATE_TO_POSE, MotionConfig
+from webmap.config.reading import Config, read_part, tables_of
+from webmap.config.robot import LINKED
 from webmap.core.extendable import Extendable
 from webmap.core.module_arguments import WrongArguments, check_arguments
 from webmap.core.motion import RobotMotion
@@ -77,6 +86,9 @@ class MovableRobot(Extendable):
         namespace: The namespace of its modules.
 
     """
+
+    _parts: ClassVar[Mapping[str, type[Config]]] = tables_of(MotionConfig)
+    """The parts of its configuration that :meth:`configure` sets, by their keys."""
 
     def __init__(self, name: str, namespace: Namespace) -> None:
         super().__init__(namespace)
@@ -175,19 +187,20 @@ class MovableRobot(Extendable):
 
         """
         what = f"robot {self.name!r}"
-        if key not in MOTION:
-            raise ConfigError(
-                f'{what}: there is no key "{key}" here; there are {", ".join(MOTION)}'
-            )
-        if key in LINKED and values is not None and bridge is None:
-            raise ConfigError(f"{what}: {key}: a bridge is missing")
-        with no_scope():
-            self.motion.set(key, values, bridge)
-        twist = self.motion.config.twist
-        self._show_base(holonomic=twist is not None and twist.holonomic)
+        if key not in self._parts:
+            keys = ", ".join(self._parts)
+            raise ConfigError(f'{what}: there is no key "{key}" here; there are {keys}')
+        part = None
+        if values is not None:
+            if key in LINKED and bridge is None:
+                raise ConfigError(f"{what}: {key}: a bridge is missing")
+            url = "" if bridge is None else bridge.url
+            part = read_part(self._parts[key], key, values, what, url)
+        self._set_part(key, part, bridge)
 
-    def _show_base(self, *, holonomic: bool) -> None:
-        """Show on pages what the base can do."""
+    def _set_part(self, key: str, part: Config | None, bridge: Bridge | None) -> None:
+        with no_scope():
+            self.motion.set(key, part, bridge)
 
     @sets_part("scan_assist")
     def set_scan_assist(
@@ -334,7 +347,7 @@ class MovableRobot(Extendable):
             if time.monotonic() > deadline:
                 break  # the gate gives the reason
             await asyncio.sleep(0.02)
-        epoch = await asyncio.wrap_future(self.motion.take())
+        epoch = await asyncio.wrap_future(self.motion.commands().take(self.id))
         while (why := self._not_drivable(epoch)) is not None:
             if time.monotonic() > deadline:
                 self.release_lease()
@@ -361,7 +374,7 @@ class MovableRobot(Extendable):
 
     def release_lease(self) -> None:
         """Release control; a moving robot is stopped."""
-        self.motion.release()
+        self.motion.commands().release(self.id)
 
     def twist(
         self,
@@ -395,7 +408,10 @@ class MovableRobot(Extendable):
                 limit for it, or a number is not finite.
 
         """
-        self.motion.twist(Twist(x, y, rz, z, rx, ry))
+        gate, twist = self.motion.commands(), Twist(x, y, rz, z, rx, ry)
+        if why := self.motion.axes.refusal(twist):
+            raise MotionError(f"robot {self.name!r}: the velocity was not sent: {why}")
+        gate.twist(self.id, twist)
 
     def move(
         self,
@@ -424,7 +440,11 @@ class MovableRobot(Extendable):
         """
         o = orientation
         yaw = Quaternion(o.x, o.y, o.z, o.w).yaw
-        self.motion.move(position.x, position.y, yaw, by)
+        gate = self.motion.commands()
+        if by is None:
+            gate.move(self.id, position.x, position.y, yaw)
+        else:
+            by.move(self.id, position.x, position.y, yaw)
 
     def locate(self, position: Position, orientation: Orientation) -> None:
         """Send the robot its own pose, while it neither moves nor follows a goal.
@@ -438,11 +458,12 @@ class MovableRobot(Extendable):
 
         """
         o = orientation
-        self.motion.locate(position.x, position.y, Quaternion(o.x, o.y, o.z, o.w).yaw)
+        yaw = Quaternion(o.x, o.y, o.z, o.w).yaw
+        self.motion.commands().locate(self.id, position.x, position.y, yaw)
 
     def cancel(self) -> None:
         """Cancel the robot's goals, whoever sent them; this needs no control."""
-        self.motion.cancel()
+        self.motion.commands().cancel(self.id)
 
     def stop(self) -> None:
         """Stop the robot, no matter who has control, and cancel its goals.
@@ -450,7 +471,7 @@ class MovableRobot(Extendable):
         The STOP stays active for all operators and programs, also after a restart,
         until :meth:`reset_stop` or Reset on a page.
         """
-        self.motion.stop()
+        self.motion.commands().stop_robot(self.id)
 
     def reset_stop(self) -> None:
         """End the STOP in ``report``; nothing moves, and control does not change.
@@ -463,7 +484,14 @@ class MovableRobot(Extendable):
                 ``report.stop`` is set.
 
         """
-        self.motion.reset_stop(self.report)
+        gate, report = self.motion.commands(), self.report
+        stop = None if report is None else report.stop
+        if stop is None:
+            raise MotionError(
+                f"robot {self.name!r}: its report has no STOP to reset; after stop(), "
+                "wait until report.stop is set"
+            )
+        gate.reset(self.id, stop.id)
 
     # Reports of the gate.
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from webmap.base.geometry import Affine, Pose
 from webmap.base.scope import Removal, no_scope
+from webmap.config.robot import OdometryConfig, TfConfig
 from webmap.core.frame_pace import frame_pace
 from webmap.core.movable_robot import MovableRobot
 from webmap.poses.alignment import HERE, alignments
@@ -71,21 +72,19 @@ class PoseSource:
 
     # Sources of poses.
 
-    def follow(
-        self, bridge: Bridge, topic: str, throttle: int | None, type: str | None
-    ) -> None:
+    def follow(self, bridge: Bridge, odometry: OdometryConfig) -> None:
         """Receive poses from a topic; see :meth:`Robot.set_odometry_topic`."""
         self.unfollow()
-        typed = partial(self._on_type, bridge, topic)
-        if type is None:
+        typed = partial(self._on_type, bridge, odometry.topic)
+        if odometry.type is None:
             typed(None)  # otherwise the feed calls it at once
         try:
             with no_scope():
                 self.feed = OdometryFeed(
                     bridge,
-                    topic,
-                    throttle,
-                    type,
+                    odometry.topic,
+                    odometry.throttle,
+                    odometry.type,
                     listener=self._on_reading,
                     typed=typed,
                     complain=self._on_complaint,
@@ -105,20 +104,19 @@ class PoseSource:
             self._robot.motion.clear_odometry()
             self._restart()
 
-    def place(
-        self,
-        bridge: Bridge,
-        map_frame: str,
-        base_frame: str,
-        namespace: str,
-        quiet: bool,
-    ) -> None:
-        """Transform poses to the frame of the map; see :meth:`Robot.set_tf`."""
+    def place(self, bridge: Bridge, tf: TfConfig, base_link: str) -> None:
+        """Transform poses to the frame of the map; see :meth:`Robot.set_tf`.
+
+        Args:
+            bridge: The bridge of the frames.
+            tf: The frames.
+            base_link: The robot's own frame, if ``tf`` has none.
+
+        """
         self.unplace()
-        frames = self.frames = frames_of(bridge, namespace)
-        placing = Placing(
-            frames.buffer, frames.namespace, map_frame, base_frame, quiet=quiet
-        )
+        frames = self.frames = frames_of(bridge, tf.namespace)
+        base, space = tf.base_frame or base_link, frames.namespace
+        placing = Placing(frames.buffer, space, tf.map_frame, base, quiet=tf.quiet)
         self.pipeline.placing = placing
         self._robot.motion.base_frame = placing.base_frame
         self._frames_removal = frames.join(self._on_frames, self._needs_frames)

@@ -8,12 +8,17 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from webmap.base.audience import audience
-from webmap.base.errors import ConfigError
 from webmap.base.geometry import Pose, Quaternion, Twist, Vector3
 from webmap.base.scope import Removal, keep
 from webmap.config.checks import Mistakes
-from webmap.config.reading import read, read_part
-from webmap.config.robot import BATTERY_LOW, OdometryConfig, RobotConfig, TfConfig
+from webmap.config.reading import Config, read
+from webmap.config.robot import (
+    BATTERY_LOW,
+    PARTS,
+    OdometryConfig,
+    RobotConfig,
+    TfConfig,
+)
 from webmap.core.movable_robot import MovableRobot, sets_part
 from webmap.core.pose_source import PoseSource
 from webmap.core.problems import Problems
@@ -52,6 +57,8 @@ class VisibleRobot(MovableRobot):
 
     The arguments are those of :class:`webmap.Robot`.
     """
+
+    _parts = PARTS
 
     def __init__(
         self,
@@ -95,9 +102,6 @@ class VisibleRobot(MovableRobot):
         robots[self.id] = self
         audience.follow(self)
         keep(Removal(self.destroy))
-
-    def _show_base(self, *, holonomic: bool) -> None:
-        self.svg.set("data-holonomic", "" if holonomic else None)
 
     def __repr__(self) -> str:
         return f"<Robot {self.name!r}>"
@@ -254,32 +258,21 @@ class VisibleRobot(MovableRobot):
 
         """
 
-    def configure(
-        self,
-        key: str,
-        values: Mapping[str, Any] | None,
-        bridge: Bridge | None = None,
-    ) -> None:
-        """Set or clear one part of the configuration; see :class:`MovableRobot`."""
-        what = f"robot {self.name!r}"
-        if key in ("odometry", "tf") and values is not None and bridge is None:
-            raise ConfigError(f"{what}: {key}: a bridge is missing")
-        match key:
-            case "odometry" if values is None:
-                self.pose_source.unfollow()
-            case "tf" if values is None:
-                self.pose_source.unplace()
-            case "odometry" if values is not None and bridge is not None:
-                pose = read_part(OdometryConfig, key, values, what)
-                self.pose_source.follow(bridge, pose.topic, pose.throttle, pose.type)
-            case "tf" if values is not None and bridge is not None:
-                tf = read_part(TfConfig, key, values, what)
-                base = tf.base_frame or self.base_link
-                self.pose_source.place(
-                    bridge, tf.map_frame, base, tf.namespace, tf.quiet
-                )
-            case _:
-                super().configure(key, values, bridge)
+    def _set_part(self, key: str, part: Config | None, bridge: Bridge | None) -> None:
+        source = self.pose_source
+        if isinstance(part, OdometryConfig) and bridge is not None:
+            source.follow(bridge, part)
+        elif isinstance(part, TfConfig) and bridge is not None:
+            source.place(bridge, part, self.base_link)
+        elif key == "odometry":
+            source.unfollow()
+        elif key == "tf":
+            source.unplace()
+        else:
+            super()._set_part(key, part, bridge)
+            twist = self.motion.config.twist
+            holonomic = twist is not None and twist.holonomic
+            self.svg.set("data-holonomic", "" if holonomic else None)
 
     def unset_tf(self) -> None:
         """Stop drawing the robot by TF; does nothing if TF is not set."""

@@ -128,9 +128,7 @@ def _robot(
         data["tf"] = {"quiet": not robot.tf_alone, **data["tf"]}
     if robot.action is not None:
         name, type = robot.action
-        data["move"] = {**data["move"], "action": name, "action_type": type}
-        first = {key: data["move"].pop(key) for key in ("action", "action_type")}
-        data["move"] = {**first, **data["move"]}
+        data["move"] = {"action": name, "action_type": type, **data["move"]}
     return data
 
 

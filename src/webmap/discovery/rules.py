@@ -20,6 +20,7 @@ from posixpath import commonpath
 from typing import NamedTuple
 
 from webmap.base.errors import ConfigError
+from webmap.config.motion import TWIST_TYPES
 from webmap.discovery.findings import TopicRole
 from webmap.discovery.tf_robots import BASE, Base, Trees
 from webmap.ros.names import split_type
@@ -39,7 +40,7 @@ PARTS = (
 ODOMETRY = ("nav_msgs/Odometry",)
 POSES = ("geometry_msgs/PoseWithCovarianceStamped", "geometry_msgs/PoseStamped")
 BARE_POSES = ("geometry_msgs/Pose", "geometry_msgs/Pose2D")
-VELOCITY = ("geometry_msgs/Twist", "geometry_msgs/TwistStamped")
+VELOCITY = TWIST_TYPES
 GRID = ("nav_msgs/OccupancyGrid",)
 PATH = ("nav_msgs/Path",)
 CAMERA = ("sensor_msgs/CompressedImage", "sensor_msgs/Image")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from webmap.base.geometry import Twist
 from webmap.gate.events import Key, Press
-from webmap.gate.protocol import FromGate, GoalMethod, RobotSpec
+from webmap.gate.protocol import FromGate, GoalMethod, RobotSpec, StopHook
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +168,7 @@ class RunHook:
 
     key: Key
     robot: str
-    hook: dict[str, str]
+    hook: StopHook
     stopped: bool
     number: int
 

@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 import msgspec
 
 from webmap.base.geometry import Twist
-from webmap.gate.protocol import Identity
+from webmap.gate.protocol import Identity, StopHook
 
 Lane = Literal["control", "odometry", "tasks"]
 Outcome = Literal["reached", "failed", "cancelled"]
@@ -173,7 +173,7 @@ class HookEnded:
     """A ``RunHook`` has ended: the message was written, or the service answered."""
 
     robot: str
-    hook: dict[str, str]
+    hook: StopHook
     number: int
     why: str | None
     """Why it was not sent or the robot refused it, as text; ``None`` on success."""

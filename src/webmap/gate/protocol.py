@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
+from webmap.base.outline import Point
 from webmap.base.roles import Role
 from webmap.gate.commands import ProgramCommand, Velocity
 
@@ -36,10 +37,6 @@ GoalMethod = Literal["topic", "navigate_to_pose", "move_base"]
 ROS 1."""
 
 
-Point = tuple[float, float]
-"""x (forward) and y (left) in metres, in the robot's own frame."""
-
-
 class AssistSpec(msgspec.Struct, frozen=True, kw_only=True):
     """What scan assist needs to know of a robot."""
 
@@ -61,6 +58,28 @@ class AssistSpec(msgspec.Struct, frozen=True, kw_only=True):
     """What the robot does while the scan is old, empty or mostly unknown."""
     creep: float = 0.1
     """The speed of creeping, in m/s."""
+
+
+class StopHook(
+    msgspec.Struct,
+    frozen=True,
+    kw_only=True,
+    omit_defaults=True,
+    repr_omit_defaults=True,
+):
+    """What else is sent to a robot's bridge on STOP: a topic or a service."""
+
+    topic: str = ""
+    """A topic of type ``std_msgs/Bool``: true is published, and false on reset."""
+    service: str = ""
+    """A service of type ``std_srvs/Trigger``, which is called."""
+    type: str = ""
+    """The type, in either dialect; that of ROS 1 if empty."""
+
+    @property
+    def name(self) -> str:
+        """The name of the topic or of the service."""
+        return self.topic or self.service
 
 
 class RobotSpec(
@@ -133,10 +152,7 @@ class RobotSpec(
     poses arrive on the common map, and are sent to the robot in its own map."""
     assist: AssistSpec | None = None
     """The scan assist of the robot; ``None`` is off."""
-    stop_hooks: tuple[dict[str, str], ...] = ()
-    """What else is sent to the robot's bridge on STOP: ``{"topic": "/lock", "type":
-    "std_msgs/Bool"}`` publishes true (and false on reset), ``{"service": "/e_stop",
-    "type": "std_srvs/Trigger"}`` is called."""
+    stop_hooks: tuple[StopHook, ...] = ()
 
 
 class Forget(msgspec.Struct, frozen=True, tag="forget"):

@@ -1,18 +1,14 @@
-"""Checks the declaration of a robot, and puts its names in one form.
+"""Checks the declaration of a robot, and puts its names in one form."""
 
-Scan assist computes which points lie inside the outline and when a point touches an
-edge. Both need an outline with an area and without crossing edges.
-"""
-
-import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import msgspec
 
 from webmap.base.errors import ConfigError
-from webmap.gate.protocol import AssistSpec, Point, RobotSpec
+from webmap.base.outline import why_no_outline
+from webmap.gate.protocol import AssistSpec, RobotSpec, StopHook
 from webmap.ros.names import (
     has_gate,
     is_type,
@@ -25,160 +21,38 @@ from webmap.ros.names import (
 if TYPE_CHECKING:
     from webmap.gate.events import Key
 
-MOST_CORNERS = 100
-"""The most corners of an outline: each costs time with every command."""
 
-LEAST_AREA = 1e-4
-"""The least area in square metres: a square of one centimetre."""
-
-FARTHEST = 1000.0
-"""The most metres from the robot's origin to a corner, along x and along y."""
-
-
-def polygon_around(radius: float, corners: int = 12) -> tuple[Point, ...]:
-    """Return the corners of a regular polygon around a disc, in order."""
-    outer = radius / math.cos(math.pi / corners)
-    turns = (math.tau * corner / corners for corner in range(corners))
-    return tuple((outer * math.cos(turn), outer * math.sin(turn)) for turn in turns)
-
-
-def why_no_outline(corners: Sequence[Point]) -> str | None:
-    """Return why corners make no outline, as text to follow a colon.
-
-    Args:
-        corners: The corners in order; finite, in metres.
-
-    Returns:
-        ``None`` if they make an outline.
-
-    """
-    number = len(corners)
-    if not 3 <= number <= MOST_CORNERS:
-        return f"expected 3 to {MOST_CORNERS} corners, got {number}"
-    if any(abs(x) > FARTHEST or abs(y) > FARTHEST for x, y in corners):
-        return f"expected corners within {FARTHEST:g} m of the robot's origin"
-    for (i, one), (j, other) in itertools.combinations(enumerate(corners, 1), 2):
-        if one == other:
-            return f"corners {i} and {j} are the same point; leave one of them out"
-    for i, j in itertools.combinations(range(number), 2):
-        if _cross(corners, i, j):
-            return (
-                f"the edge from corner {i + 1} meets the edge from corner {j + 1}; "
-                "give the corners in their order around the robot"
-            )
-    area = abs(_area(corners))
-    if area < LEAST_AREA:
-        return (
-            f"it has an area of {area:g} m²; expected {LEAST_AREA:g} m² or more, with "
-            "lengths in metres"
-        )
-    return None
-
-
-def _cross(corners: Sequence[Point], i: int, j: int) -> bool:
-    """Return whether two edges meet, other than neighbours in their common corner."""
-    number = len(corners)
-    a, b = corners[i], corners[(i + 1) % number]
-    c, d = corners[j], corners[(j + 1) % number]
-    if b == c:  # neighbours share a corner, and cross if one runs back over the other
-        return _turn(a, b, d) == 0.0 and _ahead(a, b, d) < 0.0
-    if d == a:
-        return _turn(c, d, b) == 0.0 and _ahead(c, d, b) < 0.0
-    apart = _turn(a, b, c) * _turn(a, b, d) > 0.0 or _turn(c, d, a) * _turn(c, d, b) > 0
-    return not apart and _boxes_meet(a, b, c, d)
-
-
-def _turn(a: Point, b: Point, c: Point) -> float:
-    """Return on which side of the line from a to b the point c lies; 0 on it."""
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-
-
-def _ahead(a: Point, b: Point, c: Point) -> float:
-    """Return how far c lies ahead of b, seen from a; negative if behind."""
-    return (b[0] - a[0]) * (c[0] - b[0]) + (b[1] - a[1]) * (c[1] - b[1])
-
-
-def _boxes_meet(a: Point, b: Point, c: Point, d: Point) -> bool:
-    return all(
-        max(a[k], b[k]) >= min(c[k], d[k]) and max(c[k], d[k]) >= min(a[k], b[k])
-        for k in (0, 1)
-    )
-
-
-def _area(corners: Sequence[Point]) -> float:
-    """Return the area inside; negative if the corners are in clockwise order."""
-    pairs = itertools.pairwise((*corners, corners[0]))
-    return sum(ax * by - bx * ay for (ax, ay), (bx, by) in pairs) / 2
-
-
-PLACES = (("topic", "std_msgs/Bool"), ("service", "std_srvs/Trigger"))
-"""What a stop hook may name, and its ROS type."""
-
-
-def checked_hooks(
-    name: str, hooks: Any, twist_topic: str | None
-) -> tuple[dict[str, str], ...]:
-    """Return the stop hooks of the robot called ``name``, with names resolved.
+def checked_hook(name: str, hook: StopHook, twist_topic: str | None) -> StopHook:
+    """Return a stop hook of the robot called ``name``, with its name resolved.
 
     Args:
         name: The name of the robot, for errors.
-        hooks: Any number of hooks, in order.
+        hook: The hook.
         twist_topic: The velocity topic, which no hook may write to.
 
     Raises:
-        ConfigError: If a hook is invalid.
+        ConfigError: If the hook is invalid.
 
     """
-    if isinstance(hooks, str | Mapping) or not isinstance(hooks, Iterable):
+    if bool(hook.topic) == bool(hook.service):
         raise ConfigError(
-            f"robot {name!r}: stop_hooks is a list of hooks, got {hooks!r}"
+            f"robot {name!r}: a stop hook has either a topic or a service, got {hook}"
         )
-    return tuple(_checked(name, hook, twist_topic) for hook in hooks)
-
-
-def place_of(hook: Mapping[str, str]) -> tuple[str, str]:
-    """Return whether a checked hook is a topic or a service, and its name."""
-    place = "topic" if "topic" in hook else "service"
-    return place, hook[place]
-
-
-def _checked(name: str, hook: Any, twist_topic: str | None) -> dict[str, str]:
-    if not isinstance(hook, Mapping):
-        raise ConfigError(
-            f"robot {name!r}: a stop hook is a table such as "
-            f"{{'topic': '/lock', 'type': 'std_msgs/Bool'}}, got {hook!r}"
-        )
-    for place, type in PLACES:
-        if place in hook and hook.keys() <= {place, "type"}:
-            return _resolved(name, hook, place, type, twist_topic)
-    raise ConfigError(
-        f"robot {name!r}: a stop hook has the key 'topic' or the key 'service', and "
-        f"besides 'type' no other, got {dict(hook)!r}"
-    )
-
-
-def _resolved(
-    name: str, hook: Mapping[str, Any], place: str, type: str, twist_topic: str | None
-) -> dict[str, str]:
-    given = hook.get("type", type)
-    if not isinstance(given, str) or not is_type(given, type):
+    place, type = "service", "std_srvs/Trigger"
+    if hook.topic:
+        place, type = "topic", "std_msgs/Bool"
+    if hook.type and not is_type(hook.type, type):
         raise ConfigError(
             f"robot {name!r}: the {place} of a stop hook is of type {type}, "
-            f"got {given!r}"
+            f"got {hook.type!r}"
         )
-    where = hook[place]
-    if not isinstance(where, str) or not where:
-        raise ConfigError(
-            f"robot {name!r}: the {place} of a stop hook is a name such as '/lock', "
-            f"got {where!r}"
-        )
-    resolved = normalise_topic(where)
+    resolved = normalise_topic(hook.name)
     if twist_topic and resolved == normalise_topic(twist_topic):
         raise ConfigError(
             f"robot {name!r}: {resolved} is the velocity topic, "
             "which cannot be a stop hook"
         )
-    return {place: resolved, "type": given}
+    return StopHook(**{place: resolved, "type": hook.type or type})
 
 
 ACTIONS = ("nav2_msgs/NavigateToPose", "move_base_msgs/MoveBaseAction")
@@ -257,7 +131,9 @@ def checked(spec: RobotSpec) -> RobotSpec:
         check_every=_number(spec, "check_every", least=1.0),
         stops_within=_number(spec, "stops_within", least=0.0),
         assist=spec.assist and checked_assist(spec.name, spec.assist),
-        stop_hooks=checked_hooks(spec.name, spec.stop_hooks, spec.twist_topic),
+        stop_hooks=tuple(
+            checked_hook(spec.name, hook, spec.twist_topic) for hook in spec.stop_hooks
+        ),
     )
 
 

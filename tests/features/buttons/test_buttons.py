@@ -14,7 +14,8 @@ from button_robot import robot_node
 from equipment.webmap_process import simulator
 from webmap import Bridge, Robot
 from webmap.base.errors import ConfigError
-from webmap.config.buttons import ButtonMistake, read_button
+from webmap.config.buttons import check_buttons, read_buttons
+from webmap.config.checks import Mistakes
 from webmap.core.base_page import PageEntry
 from webmap.core.operators import Viewer
 from webmap.core.page import Page
@@ -37,13 +38,21 @@ HORN = {
     [
         ({"service": None}, "", "one of service, topic and parameter; got none"),
         ({"topic": "/x"}, "", "got service and topic"),
-        ({"lable": "x"}, "lable", 'no such key; did you mean "label"?'),
+        (
+            {"lable": "x"},
+            "lable",
+            'there is no key "lable" here; did you mean "label"?',
+        ),
+        ({"message": {}, "node": "/n"}, "node", 'with a service has no key "node"'),
+        ({"message": {"a": 1}}, "message", 'with a service has no key "message"'),
         ({"label": ""}, "label", "expected a text of 1 to 60"),
-        ({"label": None}, "label", "expected a text of 1 to 60"),
+        ({"label": None}, "", 'the key "label" is missing'),
+        ({"label": "x" * 61}, "label", "expected a text of 1 to 60"),
         ({"service": "a b"}, "service", "the name of a service"),
-        ({"type": "Trigger"}, "type", "got 'Trigger', expected a type, such as \"std"),
+        ({"type": "Trigger"}, "type", 'Trigger", expected a type, such as "std'),
         ({"timeout": 0}, "timeout", "expected seconds above 0, up to 3600"),
         ({"timeout": True}, "timeout", "expected seconds above 0"),
+        ({"timeout": 3601}, "timeout", "expected seconds above 0, up to 3600"),
         ({"confirm": 1}, "confirm", "expected true, false or a question"),
         ({"form": "yes"}, "form", "expected true or false"),
         ({"args": [1]}, "args", "expected a table of fields"),
@@ -64,10 +73,11 @@ HORN = {
 def test_an_invalid_button_is_refused_with_the_wrong_key(change, key, words):
     data = {**DOCK, **change}
     data = {name: value for name, value in data.items() if value is not None}
-    with pytest.raises(ButtonMistake) as error:
-        read_button(data)
-    assert error.value.key == key
-    assert words in error.value.message
+    mistakes = Mistakes()
+    check_buttons([data], (), mistakes)
+    ((path, message),) = mistakes.found
+    assert path == (0, *filter(None, key.split(".")))
+    assert words in message
 
 
 @pytest.mark.parametrize(
@@ -112,12 +122,59 @@ def test_buttons_that_would_move_robots_are_refused_by_name_and_by_type(
     ],
 )
 def test_a_parameter_value_that_ros_does_not_know_is_refused(value, words):
-    with pytest.raises(ButtonMistake, match=words):
-        read_button({"label": "P", "parameter": "/p", "value": value})
+    with pytest.raises(ConfigError, match=f"button 'P': value: .*{words}"):
+        read_buttons([{"label": "P", "parameter": "/p", "value": value}])
+
+
+def nested(depth):
+    value = {}
+    for _ in range(depth):
+        value = {"in": value}
+    return value
+
+
+@pytest.mark.parametrize(
+    ("button", "words"),
+    [
+        ({"topic": "/x"}, 'the key "type" is missing'),
+        ({"parameter": "/p", "value": [1], "form": True}, "no form for a list"),
+        ({"parameter": "/p", "value": 1, "type": "std_msgs/Bool"}, 'no key "type"'),
+        ({"service": "/s", "args": nested(100_000)}, "args: it is nested too deep"),
+    ],
+)
+def test_a_button_whose_keys_do_not_fit_together_is_refused(button, words):
+    with pytest.raises(ConfigError, match=words):
+        read_buttons([{"label": "P", **button}])
+
+
+def test_all_mistakes_of_a_button_are_in_one_error():
+    with pytest.raises(ConfigError) as error:
+        read_buttons([DOCK, {"label": "P", "service": "a b", "form": 1}])
+    first, second = str(error.value).splitlines()
+    assert first.startswith("button 'P': service: got the text \"a b\", expected")
+    assert second.startswith("button 'P': form: got the whole number 1, expected true")
+    with pytest.raises(ConfigError, match="button number 1: got the whole number 5"):
+        read_buttons([DOCK, 5])
+
+
+def test_a_button_with_confirm_asks_its_own_question_or_the_usual_one():
+    asked = {
+        confirm: read_buttons([{**DOCK, "confirm": confirm}])[0].question
+        for confirm in (False, True, " Is it free? ")
+    }
+    assert list(asked.values()) == [None, "Run “Dock”?", "Is it free?"]
+
+
+def test_more_than_a_hundred_buttons_are_refused():
+    many = ({"label": f"{number}", "service": "/s"} for number in range(1000))
+    with pytest.raises(ConfigError, match="button number 100: expected at most 100"):
+        read_buttons(many)
 
 
 def test_two_buttons_with_the_same_label_are_refused(link, robot):
-    with pytest.raises(ConfigError, match="two buttons have the label 'Dock'"):
+    with pytest.raises(
+        ConfigError, match=r"button 'Dock': label: .*no other button has"
+    ):
         robot.add_module("Buttons", link, [DOCK, DOCK])
 
 

@@ -100,7 +100,7 @@ class ButtonView:
             await self._ask_or_run(None)
 
     async def _ask_or_run(self, values: Any) -> None:
-        confirm = self.button.spec.confirm
+        confirm = self.button.spec.question
         if confirm is None:
             await self._run(values)
             return

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from webmap.base.errors import MotionRefused, ServiceError, WebMapError
 from webmap.base.scope import Removable, Removal, keep
-from webmap.config.buttons import ButtonSpec, motion_of, value_kind
+from webmap.config.buttons import ButtonConfig, motion_of, value_kind
 from webmap.core.motion import robot_motions
 from webmap.core.operators import Operator
 from webmap.core.shift_log import shift_log
@@ -40,7 +40,7 @@ class RobotButton:
         spec: The action.
     """
 
-    def __init__(self, robot: "Robot", bridge: Bridge, spec: ButtonSpec) -> None:
+    def __init__(self, robot: "Robot", bridge: Bridge, spec: ButtonConfig) -> None:
         self.robot = robot
         self.spec = spec
         self.state: State = "idle"
@@ -159,7 +159,7 @@ class RobotButton:
         self.notify()
 
 
-def values_of(spec: ButtonSpec) -> Mapping[str, Any]:
+def values_of(spec: ButtonConfig) -> Mapping[str, Any]:
     """Return the initial values of a form."""
     return {"value": spec.value} if spec.kind == "parameter" else spec.values
 
@@ -180,7 +180,7 @@ class ButtonFailed(WebMapError):
     """A button's action failed; the text explains the reason to people."""
 
 
-def declared_motion(spec: ButtonSpec, url: str) -> str | None:
+def declared_motion(spec: ButtonConfig, url: str) -> str | None:
     """Return why a button may not act on the declared motion topics of robots.
 
     Args:
@@ -199,7 +199,7 @@ def declared_motion(spec: ButtonSpec, url: str) -> str | None:
     return None
 
 
-async def run(bridge: Bridge, spec: ButtonSpec, values: Any) -> str:
+async def run(bridge: Bridge, spec: ButtonConfig, values: Any) -> str:
     """Run a button's action.
 
     Args:
@@ -231,7 +231,7 @@ async def run(bridge: Bridge, spec: ButtonSpec, values: Any) -> str:
         raise ButtonFailed(short_text(str(error))) from None
 
 
-async def _refuse_motion(bridge: Bridge, spec: ButtonSpec) -> None:
+async def _refuse_motion(bridge: Bridge, spec: ButtonConfig) -> None:
     """Check again, because robots are declared and the robot's types are known now.
 
     Raises:
@@ -250,7 +250,7 @@ async def _refuse_motion(bridge: Bridge, spec: ButtonSpec) -> None:
         raise ButtonFailed(f"{spec.name} is of type {found}, not of {spec.type}")
 
 
-async def _type_on_robot(bridge: Bridge, spec: ButtonSpec) -> str | None:
+async def _type_on_robot(bridge: Bridge, spec: ButtonConfig) -> str | None:
     if spec.kind == "topic":
         return await bridge.topic_type(spec.name)
     if spec.kind == "parameter":
@@ -258,14 +258,14 @@ async def _type_on_robot(bridge: Bridge, spec: ButtonSpec) -> str | None:
     return await bridge.service_type(spec.name)
 
 
-async def _call(bridge: Bridge, spec: ButtonSpec, values: Mapping[str, Any]) -> str:
+async def _call(bridge: Bridge, spec: ButtonConfig, values: Mapping[str, Any]) -> str:
     answer = await bridge.call_service(
         spec.name, values, type=spec.type, timeout=spec.timeout
     )
     return answer_text(answer)
 
 
-async def _set_ros1(bridge: Bridge, spec: ButtonSpec, value: Any) -> str:
+async def _set_ros1(bridge: Bridge, spec: ButtonConfig, value: Any) -> str:
     name = spec.name
     now = await bridge.set_parameter(name, value, timeout=spec.timeout)
     if now != value:
@@ -276,7 +276,7 @@ async def _set_ros1(bridge: Bridge, spec: ButtonSpec, value: Any) -> str:
     return f"{name} is {value_text(value)}"
 
 
-async def _set_ros2(bridge: Bridge, spec: ButtonSpec, value: Any) -> str:
+async def _set_ros2(bridge: Bridge, spec: ButtonConfig, value: Any) -> str:
     number, field = value_kind(value)
     parameter = {"name": spec.name, "value": {"type": number, field: value}}
     answer = await bridge.call_service(

@@ -28,7 +28,7 @@ from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.lane import Lane
 from webmap.gate.lanes.navigation import answer_to, readable
 from webmap.gate.lanes.sockets import Socket, SocketHandlers, open_socket
-from webmap.gate.protocol import RobotSpec
+from webmap.gate.protocol import RobotSpec, StopHook
 from webmap.gate.rules.goals import is_move_base
 from webmap.ros.rosbridge import ops
 
@@ -227,7 +227,7 @@ class TasksLane:
             id, what = generate_id(), f"cancelling the goals of {spec.action}"
             self._calls.call(rosbridge.cancel_by_service(spec.action, id), id, what)
 
-    def run_hook(self, hook: dict[str, str], stopped: bool, ended: Ended) -> None:
+    def run_hook(self, hook: StopHook, stopped: bool, ended: Ended) -> None:
         """Publish the Bool of a stop hook, or call its service.
 
         Args:
@@ -237,17 +237,15 @@ class TasksLane:
                 was a link to write it to.
 
         """
-        if "service" in hook:
-            id, service = generate_id(), hook["service"]
-            request = rosbridge.trigger(service, hook["type"], id)
-            self._calls.call(request, id, f"stop hook {service}", ended)
-        elif self.lane.write(
-            rosbridge.flag(hook["topic"], stopped), only_if_clear=False
-        ):
+        if hook.service:
+            id = generate_id()
+            request = rosbridge.trigger(hook.service, hook.type, id)
+            self._calls.call(request, id, f"stop hook {hook.service}", ended)
+        elif self.lane.write(rosbridge.flag(hook.topic, stopped), only_if_clear=False):
             ended(None)
         else:
             why = "not sent: no connection"
-            log.warning("stop hook %s: %s", hook["topic"], why)
+            log.warning("stop hook %s: %s", hook.topic, why)
             ended(why)
 
     def close(self) -> None:
@@ -339,8 +337,7 @@ class FeedbackThrottle:
 
 def hook_topics(spec: RobotSpec) -> list[Topic]:
     """Return the topics of a robot's stop hooks."""
-    hooks = spec.stop_hooks
-    return [(hook["topic"], hook["type"]) for hook in hooks if "topic" in hook]
+    return [(hook.topic, hook.type) for hook in spec.stop_hooks if hook.topic]
 
 
 def goal_topics(spec: RobotSpec) -> list[Topic]:

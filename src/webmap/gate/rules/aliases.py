@@ -5,10 +5,9 @@ from operator import attrgetter
 from webmap.gate.actions import Detach, Emit, RunHook, SendToDisplay
 from webmap.gate.events import HookEnded, Key
 from webmap.gate.limits import Axes, axes_of
-from webmap.gate.protocol import Refused, RobotSpec
+from webmap.gate.protocol import Refused, RobotSpec, StopHook
 from webmap.gate.rules.goals import Goals
 from webmap.gate.rules.health import LinkHealth
-from webmap.gate.specs import place_of
 
 NO_LINK = "not sent yet: no connection"
 
@@ -34,16 +33,16 @@ class StopHooks:
         self._number = 0
         """How often the hooks were sent: an answer to an earlier time is ignored."""
         self._owes_reset = False
-        self._failed: dict[tuple[str, str], str] = {}
+        self._failed: dict[StopHook, str] = {}
         """Why the last message did not arrive, by hook."""
-        self._unanswered: set[tuple[str, str]] = set()
+        self._unanswered: set[StopHook] = set()
         """The hooks that were sent and whose result is not known yet."""
 
     @property
     def failures(self) -> tuple[str, ...]:
         """The failed hooks and why each failed, as text for people."""
         what = "stop hook" if self._stopped else "reset of stop hook"
-        return tuple(f"{what} {name}: {why}" for (_, name), why in self._failed.items())
+        return tuple(f"{what} {hook.name}: {why}" for hook, why in self._failed.items())
 
     @property
     def done(self) -> bool:
@@ -60,25 +59,25 @@ class StopHooks:
         for hook in self.spec.stop_hooks:
             # A service of type Trigger cannot be undone: an emergency stop of the
             # robot itself is reset at the robot.
-            if not stopped and "service" in hook:
+            if not stopped and hook.service:
                 continue
             if self.link.up:
                 # An earlier failure of this hook stays known until the answer.
                 run = RunHook(self._key, self.spec.id, hook, stopped, self._number)
-                self._unanswered.add(place_of(hook))
+                self._unanswered.add(hook)
                 self._emit(run)
             else:
-                self._failed[place_of(hook)] = NO_LINK
+                self._failed[hook] = NO_LINK
 
     def ended(self, event: HookEnded) -> None:
         """Note the result of a hook, if the hooks were not sent again since."""
         if event.number != self._number:
             return
-        self._unanswered.discard(place_of(event.hook))
+        self._unanswered.discard(event.hook)
         if event.why is None:
-            self._failed.pop(place_of(event.hook), None)
+            self._failed.pop(event.hook, None)
         else:
-            self._failed[place_of(event.hook)] = event.why
+            self._failed[event.hook] = event.why
             self._owes_reset = not self._stopped
 
     def link_up(self) -> None:

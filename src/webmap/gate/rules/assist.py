@@ -19,8 +19,9 @@ from collections.abc import Iterable, Sequence
 import msgspec
 
 from webmap.base.geometry import Twist
+from webmap.base.outline import Point
 from webmap.gate.events import Scan
-from webmap.gate.protocol import AssistSpec, Point
+from webmap.gate.protocol import AssistSpec
 from webmap.gate.rules import scan_geometry
 from webmap.gate.rules.aliases import Aliases
 from webmap.gate.rules.scan_geometry import (

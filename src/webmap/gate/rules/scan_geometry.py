@@ -27,8 +27,8 @@ from collections.abc import Iterator, Sequence
 import msgspec
 
 from webmap.base.geometry import Twist
+from webmap.base.outline import Point
 from webmap.gate.events import Scan, ScanFold
-from webmap.gate.protocol import Point
 
 MOST = 720
 """The most beams of a folded scan."""
