@@ -1,4 +1,4 @@
-"""Messages read and written here, compared with rosbags for every type it has."""
+"""Messages read and written here, compared with rosbags for all types that it has."""
 
 import random
 from array import array
@@ -13,8 +13,10 @@ from webmap.ros.serialized.schemas import read_schema
 from webmap.ros.serialized.writer import make_writer
 
 TIMES = {"secs": "sec", "nsecs": "nanosec"}
+pytestmark = pytest.mark.slow
+
 RELEASES = ["ROS1_NOETIC", "ROS2_HUMBLE", "ROS2_JAZZY"]
-EXAMPLES = 3
+EXAMPLES = 2
 
 
 def filled(field, some):

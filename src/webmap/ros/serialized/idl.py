@@ -61,7 +61,7 @@ class _Idl:
         token = self._next
         if not token or (expected and token != expected):
             raise ConfigError(
-                f"the IDL has {token or 'its end'} where {expected or 'more'} is "
+                f"the IDL has {token[:80] or 'its end'} where {expected or 'more'} is "
                 "expected"
             )
         self._next = next(self._tokens, "")
@@ -93,7 +93,7 @@ class _Idl:
                 self._take()
         else:
             raise ConfigError(
-                f"the IDL has {word!r}; expected module, struct, typedef or const"
+                f"the IDL has {word[:80]!r}; expected module, struct, typedef or const"
             )
         self._take(";")
 
@@ -172,7 +172,7 @@ class _Idl:
     def _number(self) -> str:
         token = self._take()
         if not _NUMBER.fullmatch(token):
-            raise ConfigError(f"the IDL has {token} where a number is expected")
+            raise ConfigError(f"the IDL has {token[:80]} where a number is expected")
         return token
 
     def _joined(self, type: str, size: str) -> str:

@@ -5,15 +5,12 @@ that nobody wants are padding there. Views are built directly.
 """
 
 import struct
-import types
-import typing
 from collections.abc import Container, Sequence
 from itertools import groupby
-from typing import Any, NamedTuple
+from typing import Any
 
 import msgspec
 
-from webmap.base.errors import ProtocolError
 from webmap.ros.arrays import Numbers
 from webmap.ros.definitions import FLOATS, INTEGERS, OCTETS, Field
 from webmap.ros.limits import MAX_VALUES
@@ -28,13 +25,18 @@ from webmap.ros.serialized.schemas import (
     least_size,
     parts_of,
 )
+from webmap.ros.serialized.views import (
+    Skipped,
+    check_view,
+    is_row,
+    item_of,
+    view_fields,
+    wanted_of,
+    without_none,
+)
 
 COPIED = 1 << 16
 """Bytes of a message up to which it is read as ``bytes``, which is faster."""
-
-
-class _Skipped:
-    """In place of a type: nobody wants the value."""
 
 
 class Program:
@@ -64,6 +66,7 @@ class Program:
         usual: bool = False,
     ) -> None:
         self.names: dict[str, Any] = {}
+        self._known: dict[int, str] = {}
         self._encoding = encoding
         self._cdr = encoding == "cdr"
         self._order = ">" if big else "<"
@@ -79,8 +82,8 @@ class Program:
         self._pieces: list[Piece] | None = None
         self._columns = False
         whole = Field("", schema.type, schema.fields)
-        if _is_row(whole, wanted or Any, encoding):
-            result = self._rows(whole, "1", wanted or Any)
+        if is_row(whole, wanted or Any, encoding):
+            result = self._rows(whole, None, wanted or Any)
         else:
             result = self._value(whole, wanted or Any)
         self._flush()
@@ -126,11 +129,8 @@ class Program:
 
     def _named(self, value: Any) -> str:
         """Return the name of an object."""
-        for name, each in self.names.items():
-            if each is value:
-                return name
-        name = f"g{len(self.names)}"
-        self.names[name] = value
+        name = self._known.setdefault(id(value), f"g{len(self._known)}")
+        self.names[name] = value  # so its id stays its own
         return name
 
     @property
@@ -212,21 +212,17 @@ class Program:
 
     def _message(self, type: str, fields: Sequence[Field], hint: Any) -> str:
         """Read the fields of a message; return the expression of its value."""
-        view = _view_fields(hint)
-        if view is None:
-            inner = _Skipped if hint is _Skipped else Any
-            values = {each.name: self._value(each, inner) for each in fields}
-        else:
-            _check_view(type, fields, hint, view)
-            values = {}
-            for field in fields:
-                known = view.get(field.name)
-                value = self._value(field, _Skipped if known is None else known.hint)
-                if known is not None:
-                    values[known.name] = value
+        view = view_fields(hint)
+        if view is not None:
+            check_view(type, fields, hint, view)
+        values = {}
+        for field, name, inner in wanted_of(fields, hint):
+            value = self._value(field, inner)
+            if inner is not Skipped:
+                values[name] = value
         if not fields and self._cdr:
             self._take("", 1, wanted=False)
-        if hint is _Skipped:
+        if hint is Skipped:
             return ""
         if view is not None:
             return self._call(hint, values)
@@ -263,7 +259,7 @@ class Program:
 
     def _value(self, field: Field, hint: Any) -> str:
         """Read a field; return the expression of its value."""
-        hint = _without_none(hint)
+        hint = without_none(hint)
         if field.is_array and field.type in CODES:
             return self._numbers(field, hint)
         if field.is_array:
@@ -275,12 +271,12 @@ class Program:
             return self._string(hint)
         size = SIZES[field.type]
         self._align(size)
-        value = self._take(CODES[field.type], size, wanted=hint is not _Skipped)
+        value = self._take(CODES[field.type], size, wanted=hint is not Skipped)
         if hint is float and field.type in INTEGERS:
             return self._made("float({})", [value])
         kinds: dict[Any, Container[str]] = {
             **{float: FLOATS, int: INTEGERS},
-            **{bool: ("bool",), _Skipped: SIZES},
+            **{bool: ("bool",), Skipped: SIZES},
         }
         return self._as(value, hint, field.type in kinds.get(hint, ()))
 
@@ -304,7 +300,7 @@ class Program:
             )
         length = self._length()
         self._place = ANYWHERE
-        if hint is _Skipped:
+        if hint is Skipped:
             self._move(f"{self._at} + {length}")
             return ""
         value, start = self._new(), self._at
@@ -326,23 +322,23 @@ class Program:
         if field.size is not None:
             self._align(size)
             count = field.size * size
-            data = self._take(f"{count}s", count, wanted=hint is not _Skipped)
+            data = self._take(f"{count}s", count, wanted=hint is not Skipped)
         else:
             length = self._length()
             self._align(size, f"if {length}")
             data, start = self._new(), self._at
             end = self._move(f"{start} + {length} * {size}")
             self._place = layout.after_numbers(field.type)
-            if hint is not _Skipped:
+            if hint is not Skipped:
                 self._line(f"if {end} > n: raise short()")
                 self._line(f"{data} = d[{start}:{end}]")
-        if hint is _Skipped:
+        if hint is Skipped:
             return ""
         if isinstance(hint, type) and issubclass(hint, Numbers):
             return self._made(f"packed({self._named(hint)}, {code!r}, {{}})", [data])
         if field.type in OCTETS:
             return self._as(self._made("bytes({})", [data]), hint, hint is bytes)
-        item = _item_of(hint)
+        item = item_of(hint)
         if field.type == "bool":
             values = self._made("[*map(bool, {})]", [data])
             return self._as(values, hint, item in (Any, bool))
@@ -355,16 +351,16 @@ class Program:
     def _array(self, field: Field, hint: Any) -> str:
         """Read an array of messages or of strings."""
         count = self._length() if field.size is None else str(field.size)
-        item = _Skipped if hint is _Skipped else _item_of(hint)
+        item = Skipped if hint is Skipped else item_of(hint)
         one, parts = layout.one_of(field), parts_of(field, self._encoding)
         record = layout.record_size(parts, self._encoding) if parts else None
         if record is not None:
             found = self._records(one, count, record, item or Any)
-        elif self._indent == 2 and _is_row(one, item, self._encoding):
+        elif self._indent == 2 and is_row(one, item, self._encoding):
             found = self._rows(one, count, item or Any)
         else:
             found = self._loop(one, count, item or Any)
-        return found if hint is _Skipped else self._as(found, hint, item is not None)
+        return found if hint is Skipped else self._as(found, hint, item is not None)
 
     def _records(
         self, one: Field, count: str, record: tuple[int, int], hint: Any
@@ -376,7 +372,7 @@ class Program:
         start = self._at
         end = self._move(f"{start} + {count} * {size}")
         after = Place(min(unit, 4), 0)
-        if hint is _Skipped:
+        if hint is Skipped:
             self._place = after
             return ""
         self._check_count(one, count, f"{end} > n")
@@ -388,22 +384,22 @@ class Program:
         each = f"{self._named(step.iter_unpack)}(d[{start}:{end}])"
         return self._list(value, names, each)
 
-    def _rows(self, one: Field, count: str, hint: Any) -> str:
+    def _rows(self, one: Field, count: str | None, hint: Any) -> str:
         """Read messages of fields of fixed size and strings in one step.
 
         Args:
             one: One of them.
-            count: Their number; if it is 1, there is no list.
+            count: Their number; None for the message itself, which is in no list.
             hint: The type of one.
 
         """
-        single = count == "1"
-        if not single:
+        self._flush()
+        if count is not None:
             least = least_size((one,), self._encoding)
             self._check_count(one, count, f"{count} * {least} > n - ({self._at})")
         pieces: list[Piece] = []
         self._pieces, self._place, offset = pieces, ANYWHERE, self._offset
-        self._columns = not single and hint is not Any  # slower for a dict
+        self._columns = count is not None and hint is not Any  # slower for a dict
         value = self._value(one, hint)
         self._flush()
         columns, self._columns, self._pieces = self._columns, False, None
@@ -412,13 +408,13 @@ class Program:
         self._place, self._offset = ANYWHERE, offset
         rows = Rows(pieces, self._order, 4 if self._cdr else 0)
         at, found, key, unpacked = self._at, self._new(), "n", names
-        if not single:
+        if count is not None:
             at, unpacked = self._move(at), "u"
             key = f"({count}, n - {at}, {at} & 7)"
             each = f"for {names} in zip(*[iter(u)] * w)"
             value = f"[*{value}]" if columns else f"[{value} {each}]"
             self._line(f"w = {width}")
-        plan = f"{self._named(rows.plan)}(d, {at}, {count}, {key})"
+        plan = f"{self._named(rows.plan)}(d, {at}, {count or 1}, {key})"
         self._line(f"f, e = {self._named(rows.plans.get)}({key}) or {plan}")
         self._line(f"{unpacked} = f(d, {at})")
         self._line(f"try: {found} = {value}")
@@ -447,14 +443,14 @@ class Program:
         place = self._place.either(layout.place_after(one, ANYWHERE))
         self._place = place
         found = self._new()
-        if hint is not _Skipped:
+        if hint is not Skipped:
             self._line(f"{found} = []")
         start = self._move(self._at)
         self._line(f"for _ in range({count}):")
         self._indent += 1
         value = self._value(one, hint)
         self._flush()
-        if hint is not _Skipped:
+        if hint is not Skipped:
             self._line(f"{found}.append({value})")
         self._line(f"{start} = {self._at}")
         self._indent -= 1
@@ -468,76 +464,4 @@ def _shortened(codes: Sequence[str]) -> str:
     return "".join(
         f"{count}{code}" if len(code) == 1 and count > 1 else code * count
         for code, count in counts
-    )
-
-
-class _ViewField(NamedTuple):
-    name: str
-    hint: Any
-    required: bool
-
-
-def _view_fields(hint: Any) -> dict[str, _ViewField] | None:
-    """Return the fields of a view by their names in messages; None if it is no view."""
-    if not (isinstance(hint, type) and issubclass(hint, msgspec.Struct)):
-        return None
-    hints = typing.get_type_hints(hint, include_extras=True)
-    return {
-        each.encode_name: _ViewField(each.name, hints[each.name], each.required)
-        for each in msgspec.structs.fields(hint)
-    }
-
-
-def _check_view(
-    type: str,
-    fields: Sequence[Field],
-    hint: type[msgspec.Struct],
-    view: dict[str, _ViewField],
-) -> None:
-    names = {field.name for field in fields}
-    for name, known in view.items():
-        if known.required and name not in names:
-            raise ProtocolError(
-                f"{type} has no field {name!r}, which {hint.__name__} needs"
-            )
-
-
-def _without_none(hint: Any) -> Any:
-    """Return the type besides None; a message never has None."""
-    if isinstance(hint, types.UnionType) or typing.get_origin(hint) is typing.Union:
-        rest = [each for each in typing.get_args(hint) if each is not type(None)]
-        return rest[0] if len(rest) == 1 else hint
-    return hint
-
-
-def _item_of(hint: Any) -> Any:
-    """Return the type of the items of a list; None if no list is wanted."""
-    if hint is Any or hint is list:
-        return Any
-    return typing.get_args(hint)[0] if typing.get_origin(hint) is list else None
-
-
-def _is_row(field: Field, hint: Any, encoding: Encoding) -> bool:
-    """Return whether a message has a fixed size but for strings, all of them wanted.
-
-    In each message in it something must be wanted, too.
-    """
-    hint = _without_none(hint)
-    parts = parts_of(field, encoding)
-    if field.is_array:
-        return parts is None and field.type != "string" and field.size is not None
-    if parts is None:
-        return field.type != "string" or hint is not _Skipped
-    view = _view_fields(hint)
-    hints = {
-        each.name: view[each.name].hint
-        if view and each.name in view
-        else Any
-        if view is None and hint is not _Skipped
-        else _Skipped
-        for each in parts
-    }
-    wanted = any(each is not _Skipped for each in hints.values())
-    return (wanted or hint is _Skipped) and all(
-        _is_row(each, hints[each.name], encoding) for each in parts
     )

@@ -23,7 +23,7 @@ Encoding: TypeAlias = Literal["cdr", "ros1"]
 MAX_FIELDS = 2_000
 """Most fields of a type, with the fields of the types in it."""
 
-MAX_TEXT = 1 << 20
+MAX_TEXT = 1 << 18
 """Most characters of the text of a schema."""
 
 CODES = {

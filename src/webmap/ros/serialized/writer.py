@@ -2,11 +2,11 @@
 
 import struct
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, TypeAlias
 
 from webmap.ros.definitions import OCTETS, TIMES, Field
-from webmap.ros.message_check import Misfit, check_names, check_size, wrong
+from webmap.ros.message_check import Misfit, check_names, check_size, expectation, wrong
 from webmap.ros.serialized.schemas import CODES, SIZES, Encoding, Schema, parts_of
 
 Writer: TypeAlias = Callable[[Mapping[str, Any]], bytes]
@@ -73,7 +73,8 @@ class _Writer:
             found += field.name in message
             try:
                 if field.is_array:
-                    self._array(field, () if value is None else value)
+                    absent = [None] * (field.size or 0)
+                    self._array(field, absent if value is None else value)
                 else:
                     self._one(field, field.default if value is None else value)
             except Misfit as error:
@@ -82,9 +83,9 @@ class _Writer:
             check_names(fields, message)
 
     def _array(self, field: Field, values: Any) -> None:
-        """Write an array; one of fixed size that is absent gets its default items."""
-        if field.size is not None and not len(values):
-            values = [None] * field.size
+        is_list = isinstance(values, Collection) and not isinstance(values, str)
+        if not is_list or isinstance(values, Mapping):
+            raise wrong(values, expectation(field))
         check_size(field, values)
         if field.size is None:
             self._number("uint32", len(values))
