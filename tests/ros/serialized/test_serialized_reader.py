@@ -1,3 +1,4 @@
+import contextlib
 import json
 from array import array
 
@@ -12,7 +13,7 @@ from webmap.features.layers.marker_drawing import MarkerArrayMsg
 from webmap.features.layers.point_cloud import PointCloud2Msg
 from webmap.features.layers.pose_array import ParticleCloudMsg, PoseArrayMsg
 from webmap.ros import messages
-from webmap.ros.arrays import Floats
+from webmap.ros.arrays import Floats, Int8s
 from webmap.ros.decoding import convert
 from webmap.ros.definitions import shipped
 from webmap.ros.limits import MAX_VALUES, TooLarge
@@ -286,6 +287,52 @@ def test_strings_of_many_messages_are_read(encoding):
     for number in range(3000):
         name = f"frame {number}" * (1 + 40 * (number % 100 == 0))
         assert read(write({"header": {"frame_id": name}})).frame_id == name
+
+
+@ENCODINGS
+def test_an_array_of_many_messages_is_read(encoding):
+    read, write = tools(encoding, "tf2_msgs/TFMessage", messages.TFMessage)
+    names = ["x" * (each % 9) for each in range(300)]
+    data = write({"transforms": [{"child_frame_id": name} for name in names]})
+    assert [each.child_frame_id for each in read(data).transforms] == names
+    for at in range(8, 200, 4):
+        lying = data[:at] + b"\xff\xff\xff\x7f" + data[at + 4 :]
+        with contextlib.suppress(ProtocolError):
+            read(lying)
+
+
+def test_big_endian_arrays_are_numbers_of_this_machine():
+    head = bytes.fromhex("00000000 00000002")
+    schema = read_schema("a/B", "ros2msg", "float32[] a\nint8[] b")
+    read = make_reader(schema, Numbers, "cdr")
+    message = read(head + bytes.fromhex("3fc00000 c0000000 00000001 ff"))
+    assert message.a.array().tolist() == [1.5, -2.0]
+    assert message.b.array().tolist() == [-1]
+
+
+class Numbers(msgspec.Struct):
+    a: Floats
+    b: Int8s
+
+
+@ENCODINGS
+def test_numbers_too_large_for_the_view_are_refused(encoding):
+    read, write = tools(encoding, "a/B", Numbers, "float64[] a\nint16[] b")
+    assert read(write({"a": [1.5], "b": [-3]})).a == Floats(array("f", [1.5]))
+    with pytest.raises(ProtocolError, match="a/B that cannot be read"):
+        read(write({"b": [300]}))
+
+
+@ENCODINGS
+def test_messages_without_fields_are_read_in_arrays_and_messages(encoding):
+    text = "N[2] a\nN[] b\nP[] c\nint16[] d\nstring[] e\n"
+    text += "====\nMSG: a/N\n====\nMSG: a/P\nN n\nuint16 x\nuint16[2] y"
+    read, write = tools(encoding, "a/B", None, text)
+    message = {
+        **{"a": [{}, {}], "b": [{}], "d": array("h", [1]), "e": ["x"]},
+        "c": [{"n": {}, "x": each, "y": array("H", [1, 2])} for each in range(3)],
+    }
+    assert read(write(message)) == message
 
 
 def test_long_arrays_share_the_memory_of_the_message():

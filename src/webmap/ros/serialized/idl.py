@@ -67,10 +67,6 @@ class _Idl:
         self._next = next(self._tokens, "")
         return token
 
-    def _skip(self, end: str) -> None:
-        while self._take() != end:
-            pass
-
     def _definition(self, scope: tuple[str, ...]) -> None:
         self._annotations()
         word = self._take()
