@@ -21,6 +21,8 @@ from webmap.ros.serialized.reader import make_reader
 from webmap.ros.serialized.schemas import CODES, read_schema
 from webmap.ros.serialized.writer import make_writer
 
+pytestmark = pytest.mark.slow
+
 VIEWS = {
     "nav_msgs/Odometry": OdometryMsg,
     "sensor_msgs/LaserScan": LaserScanMsg,
@@ -73,7 +75,7 @@ def texts(draw):
     return parts
 
 
-@settings(max_examples=150)
+@settings(max_examples=100)
 @given(data=st.data(), parts=texts())
 def test_messages_of_random_types_are_read_as_by_rosbags(data, parts):
     for encoding, language in LANGUAGES.items():
@@ -100,7 +102,7 @@ def test_messages_of_random_types_are_read_as_by_rosbags(data, parts):
 
 
 @pytest.mark.parametrize(("encoding", "name"), CUT)
-@settings(max_examples=3)
+@settings(max_examples=2)
 @given(data=st.data())
 def test_a_message_is_refused_that_is_shorter_or_longer_than_its_fields(
     encoding, name, data
@@ -120,7 +122,7 @@ def test_a_message_is_refused_that_is_shorter_or_longer_than_its_fields(
 
 
 @pytest.mark.parametrize(("encoding", "name"), CUT)
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(data=st.data())
 def test_other_bytes_raise_only_errors_of_the_protocol(encoding, name, data):
     read, write = tools(encoding, name, VIEWS[name])

@@ -379,6 +379,7 @@ def test_items_without_bytes_are_counted_too():
         read(b"\xff\xff\xff\xff")
 
 
+@pytest.mark.slow
 def test_a_complete_default_message_of_each_type_is_read():
     for ros2 in (True, False):
         encoding = "cdr" if ros2 else "ros1"
