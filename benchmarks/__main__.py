@@ -27,6 +27,7 @@ class Row:
 
 ROWS = [
     Row("bridge", 20, quick=True),
+    Row("links", 4, quick=True),
     Row("viewers", 12, quick=True),
     Row("wire", 20, quick=True),
     Row("grids", 25),

@@ -57,6 +57,10 @@ VALID = [
     b'{"type":"hello","width":800,"height":600,"maps":[[1,800,600]]}',
     b'{"t":"event","mount":1,"element":2,"kind":"click","x":1.5,"y":2.5}',
     b'{"op":"drive","robot":"r1","epoch":3,"seq":17,"tick":812,"x":1,"y":0,"turn":0}',
+    b"\0\1\0\0\1\0\0\0\2\0\0\0\4\0\0\0map\0" + bytes(200),  # CDR
+    b"\0\0\0\0\0\0\0\1\0\0\0\2\0\0\0\4map\0" + bytes(200),
+    b"\0\1\0\0\2\0\0\0" + 2 * (bytes(8) + 2 * b"\2\0\0\0a\0\0\0" + bytes(56)),
+    b"\5\0\0\0\1\0\0\0\2\0\0\0\3\0\0\0map" + bytes(200),  # ROS 1
     b"GET /stream?topic=/camera&width=5 HTTP/1.1\r\nhost: x\r\n\r\n",
     b"HTTP/1.1 200 OK\r\ncontent-type: multipart/x-mixed-replace; boundary=b\r\n\r\n",
     b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"><path d="M0 0"/></svg>',
@@ -80,6 +84,8 @@ NASTY = [
     b'{"op":"publish","topic":"\\ud800","msg":{"\\udfff":"\\u0000"}}',
     b'{"op":"publish","topic":"/t","msg":{"ranges":"not base64!"}}',
     b'{"op":"publish","topic":"/t","msg":{"stamp":{"secs":-1,"nsecs":1e20}}}',
+    b"\0\1\0\0\xff\xff\xff\xff",
+    b"\0\7\0\0" + bytes(40),
     b"\x9f" * 2000,  # CBOR: lists without an end
     b"\xbf" * 2000,
     b"\x9b\xff\xff\xff\xff\xff\xff\xff\xff",  # a list of 2^64 - 1 items

@@ -26,6 +26,8 @@ from webmap.features.labels.label_store import LabelStore
 from webmap.gate.actions import SendGoal
 from webmap.gate.protocol import FromGate
 from webmap.ros.decoding import decode_json
+from webmap.ros.serialized.reader import make_reader
+from webmap.ros.serialized.schemas import read_schema
 from webmap.server.people import UserFile
 from webmap.sim.web_video import HttpError
 
@@ -213,6 +215,34 @@ def test_no_bytes_break_the_reading_of_a_message_as_any_type(data):
     for view in views():
         with may_refuse():
             decode_json(data, view)
+
+
+SERIALIZED = [
+    make_reader(read_schema(name, language), None, encoding)
+    for encoding, language in (("cdr", "ros2msg"), ("ros1", "ros1msg"))
+    for name in (
+        *("nav_msgs/Odometry", "sensor_msgs/LaserScan", "nav_msgs/OccupancyGrid"),
+        *("tf2_msgs/TFMessage", "diagnostic_msgs/DiagnosticArray", "std_msgs/Empty"),
+        *("sensor_msgs/PointCloud2", "visualization_msgs/MarkerArray", "nav_msgs/Path"),
+    )
+]
+"""Readers of serialized messages."""
+
+
+@settings(max_examples=100)
+@given(data=nearly_valid())
+def test_no_bytes_break_the_reading_of_serialized_messages(data):
+    for read in SERIALIZED:
+        with may_refuse():
+            read(data)
+
+
+@settings(max_examples=100)
+@given(data=nearly_valid(), language=st.sampled_from(["ros2msg", "ros1msg", "ros2idl"]))
+def test_no_text_breaks_the_reading_of_a_schema(data, language):
+    for text in (data.decode(errors="replace"), f"module a {{ {data!r} }};"):
+        with may_refuse(longest=25_000):
+            read_schema("a/B", language, text)
 
 
 @pytest.mark.parametrize("name", STREAMS)

@@ -13,6 +13,7 @@ an action have the names of the dialect.
 """
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -51,6 +52,10 @@ SCALARS = (*INTEGERS, *FLOATS, *TIMES, "bool", "string")
 MAX_DEPTH = 16
 """Greatest depth of nested messages."""
 
+MAX_LINES = 2_000
+"""Most fields and constants of one type."""
+
+_NONE = [("", 0)]
 _OTHER_NAMES = {
     "builtin_interfaces/Time": "time",
     "builtin_interfaces/Duration": "duration",
@@ -60,8 +65,8 @@ _OTHER_NAMES = {
 _HEAD = re.compile(r"(MSG|SRV|ACTION):\s*(\S+)\s*")
 _LINE = re.compile(
     r"(?P<type>[A-Za-z][A-Za-z0-9_/]*)"
-    r"(?:<=(?P<longest>[0-9]+))?"
-    r"(?P<array>\[(?P<bound><=)?(?P<size>[0-9]*)\])?"
+    r"(?:<=(?P<longest>[0-9]{1,10}))?"
+    r"(?P<array>\[(?P<bound><=)?(?P<size>[0-9]{0,10})\])?"
     r"\s+(?P<name>[A-Za-z][A-Za-z0-9_]*)\s*(?P<rest>.*)"
 )
 _GOAL_ID = "unique_identifier_msgs/UUID goal_id\n"
@@ -133,12 +138,19 @@ class Definitions:
     Args:
         texts: Texts by the names of types; they replace the included ones.
         ros2: Whether the definitions are those of ROS 2.
+        included: Whether types without a text have those included in WebMap.
 
     """
 
-    def __init__(self, texts: Mapping[str, str] | None = None, *, ros2: bool) -> None:
+    def __init__(
+        self,
+        texts: Mapping[str, str] | None = None,
+        *,
+        ros2: bool,
+        included: bool = True,
+    ) -> None:
         self.ros2 = ros2
-        self._texts = {**_shipped(ros2), **(texts or {})}
+        self._texts = {**(_shipped(ros2) if included else {}), **(texts or {})}
         self._read: dict[str, Definition] = {}
 
     def __contains__(self, name: str) -> bool:
@@ -183,23 +195,30 @@ class Definitions:
                 continue
             match = _LINE.fullmatch(plain)
             if match is None:
-                raise ConfigError(f"{name}: {plain!r} is no field")
+                raise ConfigError(f"{name}: {plain[:80]!r} is no field")
             if match["rest"].startswith("="):
                 value = _constant(match["type"], match["rest"][1:].strip())
                 constants.append(Constant(match["name"], match["type"], value))
             else:
                 found.append(self._field(match, (*outer, name)))
-        fields = tuple(_named(field, found, constants) for field in found)
+            if len(found) + len(constants) > MAX_LINES:
+                raise ConfigError(f"{name} has more than {MAX_LINES} lines")
+        ((twice, times),) = Counter(each.name for each in found).most_common(1) or _NONE
+        if times > 1:
+            raise ConfigError(f"{name} has two fields {twice!r}")
+        fields = _named(found, constants)
         made = self._read[name] = Definition(name, fields, tuple(constants))
         return made
 
     def _field(self, match: re.Match[str], outer: tuple[str, ...]) -> Field:
-        kind = _OTHER_NAMES.get(match["type"], match["type"])
+        kind = match["type"]
+        if "/" in kind:
+            kind = str(split_type(kind))
+        kind = _OTHER_NAMES.get(kind, kind)
         inner = None
         if kind not in SCALARS:
             if "/" not in kind:  # in the same package
                 kind = f"{outer[-1].partition('/')[0]}/{kind}"
-            kind = str(split_type(kind))
             inner = self._definition(kind, outer).fields
         rest, array = match["rest"], match["array"] is not None
         size = int(match["size"]) if match["size"] else None
@@ -241,6 +260,8 @@ def _parts(kind: str, name: str, text: str, ros2: bool) -> dict[str, str]:
     if kind == "MSG":
         return {name: text}
     parts = re.split(r"^---$", text, flags=re.MULTILINE)
+    if len(parts) != (2 if kind == "SRV" else 3):
+        raise ConfigError(f"{name}: {len(parts) - 1} lines of --- do not fit {kind}")
     if kind == "SRV":
         request, response = parts
         return {f"{name}Request": request, f"{name}Response": response}
@@ -279,27 +300,30 @@ def shipped(ros2: bool) -> Definitions:
     return Definitions(ros2=ros2)
 
 
-def _named(
-    field: Field, among: Sequence[Field], constants: Sequence[Constant]
-) -> Field:
-    """Return a field with the constants that name its values, if there are any.
+def _named(fields: Sequence[Field], constants: Sequence[Constant]) -> tuple[Field, ...]:
+    """Return fields with the constants that name their values, if there are any.
 
     These are the constants that begin with the name of the field. If there are none,
     these are all constants of its type, provided that no other field has that type and
     no constant begins with the name of a field.
     """
-    if field.is_array or field.fields is not None:
-        return field
-    same = {each.name: each.value for each in constants if each.type == field.type}
-    prefix = f"{field.name.upper()}_"
-    mine = {name: value for name, value in same.items() if name.startswith(prefix)}
-    alone = [each.type for each in among].count(field.type) == 1
-    others = any(
-        name.startswith(f"{each.name.upper()}_") for name in same for each in among
-    )
-    if not mine and alone and not others:
-        mine = same
-    return replace(field, constants=mine) if mine else field
+    by_type: dict[str, dict[str, Any]] = {}
+    for each in constants:
+        by_type.setdefault(each.type, {})[each.name] = each.value
+    prefixes = tuple(f"{field.name.upper()}_" for field in fields)
+    alone = {type for type, n in Counter(f.type for f in fields).items() if n == 1}
+    for type, same in by_type.items():
+        if any(name.startswith(prefixes) for name in same):
+            alone.discard(type)
+    named = []
+    for field, prefix in zip(fields, prefixes, strict=True):
+        same = by_type.get(field.type, {})
+        mine = {name: value for name, value in same.items() if name.startswith(prefix)}
+        if field.type in alone:
+            mine = same
+        several = field.is_array or field.fields is not None
+        named.append(replace(field, constants=mine) if mine and not several else field)
+    return tuple(named)
 
 
 def _without_comment(line: str) -> str:
@@ -316,7 +340,7 @@ def _constant(type: str, text: str) -> Any:
         if type in FLOATS:
             return float(text)
     except ValueError:
-        raise ConfigError(f"{text!r} is not a value of {type}") from None
+        raise ConfigError(f"{text[:80]!r} is not a value of {type}") from None
     if type == "bool":
         return text.strip().lower() in ("true", "1")
     if type in ("string", "wstring"):
