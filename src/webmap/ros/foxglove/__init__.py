@@ -1,0 +1,4 @@
+"""The Foxglove WebSocket protocol: robots behind a ``foxglove_bridge``.
+
+``protocol`` has the frames, without I/O.
+"""
