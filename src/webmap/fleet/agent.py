@@ -45,10 +45,10 @@ from webmap.fleet.robot_files import (
 from webmap.poses.alignment import alignments
 from webmap.ros.names import is_type, normalise_topic
 from webmap.ros.rosbridge.calls import Calls
-from webmap.ros.rosbridge.connection import BridgeConnection
 from webmap.ros.rosbridge.events import Publish
 from webmap.ros.rosbridge.graph import BridgeGraph
 from webmap.ros.rosbridge.protocol import Protocol
+from webmap.ros.sockets.connection import BridgeConnection
 from webmap.ros.subscriptions import each_counts
 
 log = logging.getLogger("webmap.agent")

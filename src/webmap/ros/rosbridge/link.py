@@ -16,7 +16,6 @@ from webmap.ros.names import split_type
 from webmap.ros.received_message import BridgeStats, ReceivedMessage
 from webmap.ros.rosbridge import ops
 from webmap.ros.rosbridge.calls import Calls
-from webmap.ros.rosbridge.connection import CLOSED_HERE, BridgeConnection
 from webmap.ros.rosbridge.events import CallService, Event, Malformed, Publish, Status
 from webmap.ros.rosbridge.graph import BridgeGraph
 from webmap.ros.rosbridge.protocol import Protocol
@@ -26,6 +25,7 @@ from webmap.ros.rosbridge.wire_subscription import (
     Renewals,
     WireSubscription,
 )
+from webmap.ros.sockets.connection import CLOSED_HERE, BridgeConnection
 from webmap.ros.subscriptions import Topic
 
 log = logging.getLogger("webmap.ros")

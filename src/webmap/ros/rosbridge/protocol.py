@@ -31,7 +31,7 @@ from webmap.ros.rosbridge.events import (
     Unknown,
     check_count,
 )
-from webmap.ros.rosbridge.frame_reader import SHORTENED
+from webmap.ros.sockets.frame_reader import SHORTENED
 
 
 def decode_png(data: str, *, max_bytes: int = MAX_OTHER) -> bytes:

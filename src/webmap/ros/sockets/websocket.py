@@ -16,8 +16,8 @@ from websockets.http11 import Request, Response
 from websockets.protocol import State
 
 from webmap.base.errors import ProtocolError
-from webmap.ros.rosbridge.frame_reader import FrameReader, ignore
-from webmap.ros.rosbridge.turns import SHARE, Turn, turns
+from webmap.ros.sockets.frame_reader import FrameReader, ignore
+from webmap.ros.sockets.turns import SHARE, Turn, turns
 
 MAX_WAITING = 1 << 20
 """Bytes that may wait for their turn; above that, reading stops."""

@@ -17,7 +17,7 @@ from webmap.ros.limits import MAX_FRAME
 from webmap.ros.received_message import LinkState
 
 if TYPE_CHECKING:
-    from webmap.ros.rosbridge.websocket import WebSocketConnection
+    from webmap.ros.sockets.websocket import WebSocketConnection
 
 log = logging.getLogger("webmap.ros")
 
@@ -232,11 +232,11 @@ class BridgeConnection:
 
 
 async def _connect(url: str) -> "WebSocketConnection":
-    await load("webmap.ros.rosbridge.websocket")
+    await load("webmap.ros.sockets.websocket")
 
     from websockets.asyncio.client import connect
 
-    from webmap.ros.rosbridge.websocket import CLOSE_TIMEOUT, WebSocketConnection
+    from webmap.ros.sockets.websocket import CLOSE_TIMEOUT, WebSocketConnection
 
     class ConnectHere(connect):
         """Connect to the given address, without redirects."""
