@@ -4,7 +4,6 @@ import base64
 import binascii
 import keyword
 import math
-import struct
 from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
@@ -26,8 +25,8 @@ from webmap.ros.definitions import (
 from webmap.ros.message_check import MessageCheck, Misfit, check_size, wrong
 from webmap.ros.names import ros2_type
 from webmap.ros.rosbridge.server.dialect import DialectName, canonical
-from webmap.ros.rosbridge.server.encode import serialize
 from webmap.ros.rosbridge.server.schema import DTYPES, Schema
+from webmap.ros.serialized.writer import serialize
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
@@ -116,10 +115,7 @@ class TypeVersion:
 
         """
         whole = self._conformer.message(self._fields, message)
-        try:
-            return serialize(self._fields, whole, ros2=self._ros2)
-        except (struct.error, UnicodeError) as error:
-            raise Misfit(str(error)) from None
+        return serialize(self._fields, whole, ros2=self._ros2)
 
 
 class Types:

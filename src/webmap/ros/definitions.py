@@ -60,8 +60,8 @@ _OTHER_NAMES = {
 _HEAD = re.compile(r"(MSG|SRV|ACTION):\s*(\S+)\s*")
 _LINE = re.compile(
     r"(?P<type>[A-Za-z][A-Za-z0-9_/]*)"
-    r"(?:<=(?P<longest>[0-9]+))?"
-    r"(?P<array>\[(?P<bound><=)?(?P<size>[0-9]*)\])?"
+    r"(?:<=(?P<longest>[0-9]{1,10}))?"
+    r"(?P<array>\[(?P<bound><=)?(?P<size>[0-9]{0,10})\])?"
     r"\s+(?P<name>[A-Za-z][A-Za-z0-9_]*)\s*(?P<rest>.*)"
 )
 _GOAL_ID = "unique_identifier_msgs/UUID goal_id\n"
@@ -133,12 +133,19 @@ class Definitions:
     Args:
         texts: Texts by the names of types; they replace the included ones.
         ros2: Whether the definitions are those of ROS 2.
+        included: Whether types without a text have those included in WebMap.
 
     """
 
-    def __init__(self, texts: Mapping[str, str] | None = None, *, ros2: bool) -> None:
+    def __init__(
+        self,
+        texts: Mapping[str, str] | None = None,
+        *,
+        ros2: bool,
+        included: bool = True,
+    ) -> None:
         self.ros2 = ros2
-        self._texts = {**_shipped(ros2), **(texts or {})}
+        self._texts = {**(_shipped(ros2) if included else {}), **(texts or {})}
         self._read: dict[str, Definition] = {}
 
     def __contains__(self, name: str) -> bool:

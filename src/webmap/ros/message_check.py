@@ -85,10 +85,10 @@ class MessageCheck:
                 )
             except Misfit as error:
                 if field.name not in value:  # a wrong name is the better reason
-                    _check_names(fields, value)
+                    check_names(fields, value)
                 raise error.inside(field.name) from None
         if found < len(value):
-            _check_names(fields, value)
+            check_names(fields, value)
         return made
 
     def absent(self, field: Field, made: dict[str, Any]) -> None:
@@ -170,7 +170,13 @@ class MessageCheck:
         return {"secs": whole, "nsecs": rest}
 
 
-def _check_names(fields: Sequence[Field], value: Mapping[str, Any]) -> None:
+def check_names(fields: Sequence[Field], value: Mapping[str, Any]) -> None:
+    """Check that each name is that of a field.
+
+    Raises:
+        Misfit: If one is not; its path is the name.
+
+    """
     names = [field.name for field in fields]
     for name in value:
         if name not in names:

@@ -3,8 +3,7 @@
 import base64
 import io
 import math
-import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import cbor2
@@ -13,7 +12,8 @@ import numpy as np
 
 from webmap.ros.definitions import OCTETS, Field
 from webmap.ros.rosbridge.server.dialect import Quirks
-from webmap.ros.rosbridge.server.schema import DTYPES, Schema
+from webmap.ros.rosbridge.server.schema import Schema
+from webmap.ros.serialized.writer import serialize
 
 # RFC 8746: typed arrays, little-endian.
 _ARRAY_TAGS = {
@@ -198,93 +198,3 @@ def _bare_nan(value: Any) -> Any:
     if isinstance(value, list):
         return [_NAN if item != item else _bare_nan(item) for item in value]
     return value
-
-
-_CDR_LITTLE_ENDIAN = b"\x00\x01\x00\x00"
-_CODES = {
-    **{"int8": "b", "uint8": "B", "byte": "B", "char": "B", "int16": "h"},
-    **{"uint16": "H", "int32": "i", "uint32": "I", "int64": "q", "uint64": "Q"},
-    **{"float32": "f", "float64": "d"},
-}
-_NUMBERS = {name: struct.Struct(f"<{code}") for name, code in _CODES.items()}
-_UINT32 = struct.Struct("<I")
-_TIMES = {
-    (False, "time"): struct.Struct("<II"),
-    (False, "duration"): struct.Struct("<ii"),
-    (True, "time"): struct.Struct("<iI"),
-    (True, "duration"): struct.Struct("<iI"),
-}
-
-
-def serialize(
-    fields: Sequence[Field], message: Mapping[str, Any], *, ros2: bool
-) -> bytes:
-    """Return the serialized bytes of a message.
-
-    Args:
-        fields: The fields of its type.
-        message: The values of all fields; arrays of numbers are lists, arrays or bytes.
-        ros2: Whether to serialize as CDR, as in ROS 2; else as in ROS 1.
-
-    Raises:
-        struct.error: If a number does not fit its type.
-
-    """
-    writer = _Writer(cdr=ros2)
-    writer.message(fields, message)
-    body = bytes(writer.out)
-    return _CDR_LITTLE_ENDIAN + body if ros2 else body
-
-
-class _Writer:
-    def __init__(self, *, cdr: bool) -> None:
-        self.cdr = cdr
-        self.out = bytearray()
-
-    def message(self, fields: Sequence[Field], message: Mapping[str, Any]) -> None:
-        if self.cdr and not fields:
-            self.out.append(0)  # CDR has no empty structure
-        for field in fields:
-            if field.is_array:
-                self._array(field, message[field.name])
-            else:
-                self._one(field, message[field.name])
-
-    def _array(self, field: Field, values: Any) -> None:
-        if field.size is None:
-            self._pack(_UINT32, len(values))
-        if isinstance(values, bytes):
-            self.out += values
-        elif field.type in DTYPES:
-            if len(values):
-                self._align(_NUMBERS[field.type].size)
-            self.out += np.asarray(values, DTYPES[field.type]).tobytes()
-        else:
-            for each in values:
-                self._one(field, each)
-
-    def _one(self, field: Field, value: Any) -> None:
-        number = _NUMBERS.get(field.type)
-        if number is not None:
-            self._pack(number, value)
-        elif field.fields is not None:
-            self.message(field.fields, value)
-        elif field.type == "string":
-            octets = value.encode() + (b"\x00" if self.cdr else b"")
-            self._pack(_UINT32, len(octets))
-            self.out += octets
-        elif field.type == "bool":
-            self.out.append(bool(value))
-        else:
-            self._align(4)
-            self.out += _TIMES[self.cdr, field.type].pack(*value.values())
-
-    def _pack(self, number: struct.Struct, value: Any) -> None:
-        out, size = self.out, number.size
-        if self.cdr and len(out) % size:
-            out += bytes(-len(out) % size)
-        out += number.pack(value)
-
-    def _align(self, size: int) -> None:
-        if self.cdr and len(self.out) % size:
-            self.out += bytes(-len(self.out) % size)

@@ -1,0 +1,151 @@
+"""Makes functions that read serialized messages; the code of each is compiled."""
+
+import struct
+import sys
+from array import array
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any, NoReturn, TypeAlias
+
+import msgspec
+
+from webmap.base.errors import ProtocolError
+from webmap.ros.arrays import NOT_COPIED, Numbers
+from webmap.ros.decoding import convert
+from webmap.ros.limits import GENERAL, MAX_VALUES, TooLarge
+from webmap.ros.serialized.program import Program
+from webmap.ros.serialized.schemas import Encoding, Schema
+
+Reader: TypeAlias = Callable[[bytes | bytearray | memoryview], Any]
+
+_NATIVE_IS_BIG = sys.byteorder == "big"
+_KINDS = {
+    2: "PL_CDR",
+    3: "PL_CDR",
+    **dict.fromkeys(range(6, 12), "XCDR2"),
+}
+
+
+@lru_cache(maxsize=512)
+def make_reader(
+    schema: Schema, wanted: type[msgspec.Struct] | None, encoding: Encoding
+) -> Reader:
+    """Return a function that reads messages of a type.
+
+    Args:
+        schema: The definition of the type.
+        wanted: A view of the type; the reader skips the fields that it has not. None
+            for a dict with all fields, as a link to a rosbridge gives it: arrays of numbers are
+            ``array.array``, ``uint8[]`` is ``bytes``.
+        encoding: The serialization of the messages.
+
+    Returns:
+        The reader. It raises ProtocolError if the bytes do not fit the schema, and
+        TooLarge if the message has more than
+        :data:`~webmap.ros.limits.MAX_VALUES` values. Long arrays share the memory of
+        the bytes, which must not change later.
+
+    Raises:
+        ProtocolError: If the schema has not the fields of ``wanted``.
+
+    """
+    if encoding == "ros1":
+        return _compiled(schema, wanted, encoding, False, _Refusal(schema))
+    big = lru_cache(maxsize=1)(
+        lambda: _compiled(schema, wanted, encoding, True, _Refusal(schema))
+    )
+
+    def other(data: bytes | bytearray | memoryview) -> Any:
+        if bytes(data[:2]) == b"\0\0" and len(data) >= 4:
+            return big()(data)
+        raise _unknown_kind(schema, data)
+
+    return _compiled(schema, wanted, encoding, False, other)
+
+
+class _Refusal:
+    def __init__(self, schema: Schema) -> None:
+        self.schema = schema
+
+    def __call__(self, data: bytes | bytearray | memoryview) -> NoReturn:
+        raise _unknown_kind(self.schema, data)
+
+
+def _unknown_kind(
+    schema: Schema, data: bytes | bytearray | memoryview
+) -> ProtocolError:
+    head = bytes(data[:2])
+    if len(data) < 4:
+        return ProtocolError(
+            f"got a {schema.type} of {len(data)} bytes; CDR begins with 4 bytes"
+        )
+    kind = _KINDS.get(int.from_bytes(head, "big"), "an unknown encoding")
+    return ProtocolError(
+        f"got a {schema.type} that begins with {head.hex(' ')} ({kind}); expected "
+        "CDR, which begins with 00 00 or 00 01"
+    )
+
+
+def _compiled(
+    schema: Schema,
+    wanted: type[msgspec.Struct] | None,
+    encoding: Encoding,
+    big: bool,
+    other: Reader,
+) -> Reader:
+    program = Program(schema, wanted, encoding, big=big)
+    foreign = big != _NATIVE_IS_BIG
+
+    def numbers(code: str, data: bytes | memoryview) -> "array[Any]":
+        found: array[Any] = array(code, bytes(data))
+        if foreign:
+            found.byteswap()
+        return found
+
+    def packed(type: type[Numbers], code: str, data: bytes | memoryview) -> Numbers:
+        if code != type.typecode or (foreign and array(code).itemsize > 1):
+            return type.from_wire(numbers(code, data))
+        if len(data) <= NOT_COPIED:
+            return type(array(code, bytes(data)))
+        return type(memoryview(data).cast(code))  # type: ignore[call-overload]
+
+    def short() -> ProtocolError:
+        return ProtocolError(
+            f"got a {schema.type} that ends before its last field; its bytes do not "
+            "fit its schema"
+        )
+
+    def long(count: int) -> ProtocolError:
+        return ProtocolError(
+            f"got a {schema.type} with {count} bytes after its last field; its bytes "
+            "do not fit its schema"
+        )
+
+    def many() -> TooLarge:
+        return TooLarge(
+            f"got a message with more than {MAX_VALUES} values; the limit is "
+            f"{MAX_VALUES}: {GENERAL.advice}"
+        )
+
+    def unfit(error: Exception) -> ProtocolError:
+        if isinstance(error, struct.error | IndexError):
+            return short()
+        return ProtocolError(f"got a {schema.type} that cannot be read: {error}")
+
+    names: dict[str, Any] = {
+        **program.names,
+        "array": array,
+        "convert": convert,
+        "long": long,
+        "many": many,
+        "numbers": numbers,
+        "other": other,
+        "packed": packed,
+        "short": short,
+        "unfit": unfit,
+        "StructError": struct.error,
+    }
+    # The text consists of numbers, of names made here, and of quoted names of fields.
+    exec(compile(program.text, f"<{schema.type}>", "exec"), names)  # noqa: S102
+    reader: Reader = names["read"]
+    return reader
