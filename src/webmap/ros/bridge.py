@@ -38,7 +38,12 @@ log = logging.getLogger("webmap.ros")
 LINKS: dict[str, LinkType] = {"ws": RosbridgeLink, "wss": RosbridgeLink}
 """The kind of link by the scheme of the URL: *A new kind of link* in the design."""
 
-_HOMES = {"zenoh": "webmap.agents.link", "zenohs": "webmap.agents.link"}
+_HOMES = {
+    "foxglove": "webmap.ros.foxglove.link",
+    "foxgloves": "webmap.ros.foxglove.link",
+    "zenoh": "webmap.agents.link",
+    "zenohs": "webmap.agents.link",
+}
 """Modules that add a kind of link when they are imported."""
 
 

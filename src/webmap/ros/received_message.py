@@ -19,6 +19,9 @@ class ReceivedMessage:
 
     __slots__ = ("_decoded", "frame", "size", "topic")
 
+    arguments: tuple[str | None, ...] = ()
+    """What the constructor needs after the topic and the bytes, in another process."""
+
     def __init__(self, topic: str, frame: bytes | bytearray) -> None:
         self.topic = topic
         self.frame = frame
@@ -91,6 +94,9 @@ class BridgeStats:
     bytes: int = 0
     malformed: int = 0
     """Frames that could not be read."""
+
+    unknown: int = 0
+    """Frames with operations that WebMap does not know."""
 
     links: int = 0
     """How often the connection was opened."""

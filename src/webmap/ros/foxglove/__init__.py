@@ -1,4 +1,7 @@
 """The Foxglove WebSocket protocol: robots behind a ``foxglove_bridge``.
 
-``protocol`` has the frames, without I/O.
+``link`` is what a :class:`webmap.Bridge` uses; open it first. ``session`` is one
+connection with what the server offers on it, ``calls`` and ``graph`` ask it, and
+``messages`` reads and writes messages by their schemas. ``protocol`` has the frames,
+without I/O.
 """
