@@ -123,11 +123,14 @@ class FoxgloveGraph:
         raise ServiceError(why)
 
     async def time(self) -> float | None:
-        """Return the time of the ROS system in seconds; None until a message came."""
+        """Return the time of the ROS system in seconds; None until a message came.
+
+        Each message has the time of the server; half of a ping is added for its way.
+        """
         if self._main.time is None:
             return None
         stamp, came = self._main.time
-        return stamp / 1e9 + time.monotonic() - came
+        return stamp / 1e9 + time.monotonic() - came + self._main.connection.lag / 2
 
     async def set_parameter(self, name: str, value: Any, patience: float) -> Any:
         """Set a parameter and return its new value.
