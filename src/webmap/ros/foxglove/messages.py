@@ -250,6 +250,16 @@ class FoxgloveMessage(ReceivedMessage):
         """The message as the robot's node sent it, without the head of the frame."""
         return self.frame[PAYLOAD:]
 
+    @property
+    def serialized(self) -> tuple[Schema, bytes | bytearray] | None:
+        """The message as the node sent it; None for JSON and for an invalid schema."""
+        if not self.is_binary:
+            return None
+        try:
+            return self.format.schema, self.payload
+        except ConfigError:
+            return None
+
     def check_count(self) -> None:
         """Check the number of values in JSON; a reader of the others counts them."""
         if not self.is_binary:
