@@ -48,20 +48,6 @@ def test_a_ros_2_bag_is_compressed(tmp_path):
     assert size < recorder.size / 4
 
 
-def test_serialized_messages_are_written_as_they_are(made, recording):
-    recorder, bag, _ = recording
-    recorder.add("/odom", ODOMETRY)
-    data = next(types_of(made.dialect).versions(ODOMETRY)).bytes_of(
-        made.odometry(0.0, 2.0)
-    )
-    recorder.take_bytes("/odom", data, BEGIN)
-    bag.close()
-    with AnyReader([bag.path]) as reader:
-        ((_, time, written),) = reader.messages()
-    assert (time, written) == (BEGIN, data)
-    assert (recorder.messages, recorder.size) == (1, len(data))
-
-
 def test_maps_and_static_frames_are_recorded_as_latched(made, recording):
     recorder, bag, _ = recording
     messages = {

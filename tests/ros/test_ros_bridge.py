@@ -22,7 +22,7 @@ from webmap.base.scope import Scope
 from webmap.ros import backoff
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import LaserScanMsg, OdometryMsg
-from webmap.ros.rosbridge import connection
+from webmap.ros.sockets import connection
 
 
 class Text(msgspec.Struct):
@@ -668,7 +668,7 @@ def test_a_link_without_data_stays_open_while_pings_are_answered(fast):
 
 
 def test_a_blocking_callback_does_not_close_the_link(fast, monkeypatch):
-    monkeypatch.setattr("webmap.ros.rosbridge.connection.LOOK_PERIOD", 0.05)
+    monkeypatch.setattr("webmap.ros.sockets.connection.LOOK_PERIOD", 0.05)
 
     async def scenario():
         reasons, got = [], []

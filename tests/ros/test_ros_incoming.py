@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from webmap.base.errors import ProtocolError
 from webmap.ros.limits import MAX_FRAME
-from webmap.ros.rosbridge.frame_reader import (
+from webmap.ros.sockets.frame_reader import (
     KEPT,
     MOST_FRAGMENTS,
     PIECE,

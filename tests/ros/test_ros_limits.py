@@ -28,8 +28,8 @@ from webmap.ros.rosbridge.events import (
     Publish,
     check_count,
 )
-from webmap.ros.rosbridge.frame_reader import SHORTENED
 from webmap.ros.rosbridge.protocol import Protocol
+from webmap.ros.sockets.frame_reader import SHORTENED
 
 MIB = 1 << 20
 

@@ -8,8 +8,8 @@ import time
 
 import pytest
 
-from webmap.ros.rosbridge.connection import BridgeConnection
-from webmap.ros.rosbridge.frame_reader import MOST_FRAGMENTS
+from webmap.ros.sockets.connection import BridgeConnection
+from webmap.ros.sockets.frame_reader import MOST_FRAGMENTS
 from webmap.testing import Sentinel
 
 MAGIC = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11"

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap.ros.rosbridge.pieces import PIECE, Pieces
-from webmap.ros.rosbridge.turns import Turn, turns
+from webmap.ros.sockets.turns import Turn, turns
 
 
 def frame(length):
@@ -116,8 +116,8 @@ def test_a_turn_asks_for_processor_time_only_when_it_may_be_over(monkeypatch):
         asked.append(clock[0])
         return used[0]
 
-    monkeypatch.setattr("webmap.ros.rosbridge.turns.time.monotonic", lambda: clock[0])
-    monkeypatch.setattr("webmap.ros.rosbridge.turns.time.thread_time", thread_time)
+    monkeypatch.setattr("webmap.ros.sockets.turns.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("webmap.ros.sockets.turns.time.thread_time", thread_time)
     turn = Turn(5.0, 0.5)
     clock[0] = 100.4
     assert not turn.is_over
@@ -145,9 +145,9 @@ def test_a_step_asks_for_processor_time_once_for_each_link(monkeypatch, links, t
         return 5.0
 
     async def story():
-        monkeypatch.setattr("webmap.ros.rosbridge.turns.time.thread_time", thread_time)
+        monkeypatch.setattr("webmap.ros.sockets.turns.time.thread_time", thread_time)
         # On a busy machine the clock may show that the turn could be over.
-        monkeypatch.setattr("webmap.ros.rosbridge.turns.time.monotonic", lambda: 100.0)
+        monkeypatch.setattr("webmap.ros.sockets.turns.time.monotonic", lambda: 100.0)
         for _ in range(links):
             turns().ask(Brief())
         await asyncio.sleep(0)

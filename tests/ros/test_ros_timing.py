@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from webmap.ros.backoff import Backoff
-from webmap.ros.rosbridge.connection import Liveness
+from webmap.ros.sockets.connection import Liveness
 from webmap.ros.subscriptions import Throttle
 
 

@@ -108,10 +108,10 @@ def test_a_message_takes_few_calls_and_no_turn_of_the_event_loop(
     topic, type, decode, message, monkeypatch
 ):
     # The bridge of this test answers no pings.
-    monkeypatch.setattr("webmap.ros.rosbridge.connection.Liveness.LIMIT", 1000.0)
+    monkeypatch.setattr("webmap.ros.sockets.connection.Liveness.LIMIT", 1000.0)
     # Turns end by time, so the counts would depend on the machine.
-    monkeypatch.setattr("webmap.ros.rosbridge.turns.STEP", 1000.0)
-    monkeypatch.setattr("webmap.ros.rosbridge.turns.SHARE", 1000.0)
+    monkeypatch.setattr("webmap.ros.sockets.turns.STEP", 1000.0)
+    monkeypatch.setattr("webmap.ros.sockets.turns.SHARE", 1000.0)
     calls = receive(topic, type, decode, message)
     each = {
         "calls of Python": sum(calls.python.values()) / MESSAGES,

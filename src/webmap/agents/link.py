@@ -14,8 +14,8 @@ from webmap.agents.peer import Handler, Peer, peer_of
 from webmap.agents.rate_limit import UserRateLimit
 from webmap.base.errors import BridgeClosed, WireError
 from webmap.ros.bridge import LINKS
-from webmap.ros.rosbridge.connection import CLOSED_HERE, BridgeConnection, Liveness
 from webmap.ros.rosbridge.link import RosbridgeLink
+from webmap.ros.sockets.connection import CLOSED_HERE, BridgeConnection, Liveness
 
 log = logging.getLogger("webmap.agent")
 

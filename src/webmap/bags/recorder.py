@@ -15,6 +15,7 @@ from webmap.base.errors import ConfigError, ProtocolError
 from webmap.ros.message_check import Misfit
 from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.rosbridge.server.dialect import DialectName, canonical
+from webmap.ros.serialized.schemas import Schema
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Qos
@@ -169,6 +170,9 @@ def _kept() -> "Qos":
     )
 
 
+_PLAIN_CDR = (b"\0\0", b"\0\1")
+"""How messages begin in the encoding that bags of ROS 2 have."""
+
 HELD = 256 << 20
 """Bytes of messages that may wait; further messages are dropped."""
 
@@ -185,6 +189,12 @@ class _Track:
     channel: Any = None
     misfit: bool = False
     """Whether a message did not fit its type."""
+
+    schema: Schema | None = None
+    """The schema of the newest message that came serialized."""
+
+    as_it_is: bool = False
+    """Whether messages of that schema are written without a change."""
 
 
 class Recorder:
@@ -251,21 +261,46 @@ class Recorder:
             why = f"messages that do not fit the type {track.type} are not recorded"
             self.drop(topic, why, str(error))
             return
-        self.take_bytes(topic, data, time)
+        self._write(track, topic, data, time)
 
-    def take_bytes(self, topic: str, data: bytes, time: int) -> None:
-        """Write a serialized message of an added topic as it is, without a check.
+    def take_serialized(
+        self, topic: str, schema: Schema, data: bytes | bytearray, time: int
+    ) -> bool:
+        """Write the bytes of a message without a change.
 
         Args:
             topic: The name of the topic.
-            data: The bytes: CDR in a bag of ROS 2, else as ROS 1 sends them.
+            schema: The definition of the message's type.
+            data: The message, as ROS nodes send it.
             time: Its time of arrival, in nanoseconds since 1970.
+
+        Returns:
+            False if they are not those of the topic's type in the bag.
 
         Raises:
             OSError: If the file cannot be written.
 
         """
         track = self._tracks[topic]
+        if track.schema is not schema:
+            track.schema = schema
+            track.as_it_is = self._choose(track, schema)
+        if not track.as_it_is or (schema.ros2 and data[:2] not in _PLAIN_CDR):
+            return False
+        self._write(track, topic, bytes(data), time)
+        return True
+
+    def _choose(self, track: _Track, schema: Schema) -> bool:
+        """Choose the release with this schema; return whether there is one."""
+        if track.channel is not None:
+            return track.version.has(schema)
+        for version in self._types.versions(track.type):
+            if version.has(schema):
+                track.version = version
+                return True
+        return False
+
+    def _write(self, track: _Track, topic: str, data: bytes, time: int) -> None:
         if track.channel is None:
             track.channel = self._bag.add(topic, track.version)
         self._bag.write(track.channel, time, data)
@@ -370,7 +405,11 @@ class RecorderThread:
 
     def _write(self, topic: str, message: ReceivedMessage, time: int) -> None:
         try:
-            self._recorder.take(topic, message.decode(), time)
+            serialized = message.serialized
+            if serialized is None or not self._recorder.take_serialized(
+                topic, *serialized, time
+            ):
+                self._recorder.take(topic, message.decode(), time)
         except ProtocolError as error:
             why = "messages that cannot be read are not recorded"
             self._recorder.drop(topic, why, str(error))

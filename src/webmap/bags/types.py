@@ -27,6 +27,7 @@ from webmap.ros.message_check import MessageCheck, Misfit, check_size, wrong
 from webmap.ros.names import ros2_type
 from webmap.ros.rosbridge.server.dialect import DialectName, canonical
 from webmap.ros.rosbridge.server.schema import DTYPES, Schema
+from webmap.ros.serialized.schemas import Schema as MessageSchema
 from webmap.ros.serialized.writer import serialize
 
 if TYPE_CHECKING:
@@ -117,6 +118,21 @@ class TypeVersion:
         """
         whole = self._conformer.message(self._fields, message)
         return serialize(self._fields, whole, ros2=self._ros2)
+
+    def has(self, schema: MessageSchema) -> bool:
+        """Return whether serialized messages of a schema are those of this release."""
+        return schema.ros2 == self._ros2 and _same_bytes(schema.fields, self._fields)
+
+
+def _same_bytes(one: Sequence[Field], other: Sequence[Field]) -> bool:
+    """Return whether fields have the same names and the same bytes."""
+    return len(one) == len(other) and all(
+        a.name == b.name
+        and (a.type == b.type or {a.type, b.type} <= set(OCTETS))
+        and (a.is_array, a.size) == (b.is_array, b.size)
+        and _same_bytes(a.fields or (), b.fields or ())
+        for a, b in zip(one, other, strict=True)
+    )
 
 
 def bytes_of_json(fields: Sequence[Field], text: bytes, *, ros2: bool) -> bytes:

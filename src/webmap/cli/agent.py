@@ -92,10 +92,10 @@ def agent(
 ) -> None:
     """Hold the gate of a robot, on the robot's computer or beside it.
 
-    URL is the address of the robot's rosbridge; FILE is a fleet file with one bridge,
-    for limits, buttons and an alignment. The agent connects to a router and listens on
-    nothing. Displays reach its robots with webmap view zenoh://HOST:7447. If the
-    network or the display fails, the agent stops the robot.
+    URL is the address of the robot's rosbridge or Foxglove bridge; FILE is a fleet file
+    with one bridge, for limits, buttons and an alignment. The agent connects to a
+    router and listens on nothing. Displays reach its robots with webmap view
+    zenoh://HOST:7447. If the network or the display fails, the agent stops the robot.
 
     \b
     webmap agent ws://localhost:9090 --router zenohs://fleet.example:7447 --name bay3

@@ -1,7 +1,7 @@
 """The connection to one ROS system, shared by the whole process.
 
 A :class:`Bridge` has topics, messages and services, and refuses messages that only the
-gate may publish. The wire protocol is in ``rosbridge``.
+gate may publish. The wire protocols are in ``rosbridge`` and ``foxglove``.
 """
 
 import asyncio
@@ -38,7 +38,12 @@ log = logging.getLogger("webmap.ros")
 LINKS: dict[str, LinkType] = {"ws": RosbridgeLink, "wss": RosbridgeLink}
 """The kind of link by the scheme of the URL: *A new kind of link* in the design."""
 
-_HOMES = {"zenoh": "webmap.agents.link", "zenohs": "webmap.agents.link"}
+_HOMES = {
+    "foxglove": "webmap.ros.foxglove.link",
+    "foxgloves": "webmap.ros.foxglove.link",
+    "zenoh": "webmap.agents.link",
+    "zenohs": "webmap.agents.link",
+}
 """Modules that add a kind of link when they are imported."""
 
 
@@ -50,7 +55,7 @@ def _link_type(url: str) -> LinkType:
 
 
 class Bridge:
-    """A connection to one ROS system through a rosbridge v2 server.
+    """A connection to one ROS system through a rosbridge or a Foxglove bridge.
 
     Creating a bridge opens no connection. The connection opens when WebMap starts, and
     reopens after each loss with all subscriptions and advertisements. Call the methods
@@ -61,7 +66,8 @@ class Bridge:
     outside of the page function.
 
     Args:
-        url: Address of the rosbridge, such as ``ws://localhost:9090``.
+        url: Address of a rosbridge, such as ``ws://localhost:9090``, or of a Foxglove
+            bridge, such as ``foxglove://localhost:8765``.
         name: Name shown to people; the address if not given.
 
     Raises:

@@ -13,8 +13,13 @@ _TYPE = re.compile(
     r"/(?P<name>[A-Za-z][A-Za-z0-9_]*)\Z"
 )
 _HOST = re.compile(r"(?:[A-Za-z0-9.-]+|\[[0-9A-Fa-f:.]+\])(?::\d{1,5})?(?:/[^\s]*)?")
-_DEFAULT_PORT = {"ws": 80, "wss": 443, "zenoh": 7447, "zenohs": 7447}
+_DEFAULT_PORT = {
+    **{"ws": 80, "wss": 443},
+    **{"foxglove": 8765, "foxgloves": 8765},
+    **{"zenoh": 7447, "zenohs": 7447},
+}
 _AGENTS = ("zenoh", "zenohs")
+_FOXGLOVE = {"foxglove": "ws", "foxgloves": "wss"}
 _WITH_GATE = ("ws", "wss", *_AGENTS)
 _MAX_NAME = 255
 _THIS_COMPUTER = ("localhost", "127.0.0.1", "[::1]")
@@ -117,6 +122,22 @@ def has_gate(url: str) -> bool:
     return url.partition("://")[0].strip().lower() in _WITH_GATE
 
 
+def is_foxglove_url(url: str) -> bool:
+    """Return whether an address is one of a ``foxglove_bridge``."""
+    return url.partition("://")[0].strip().lower() in _FOXGLOVE
+
+
+def web_socket_url(url: str) -> str:
+    """Return the ``ws`` or ``wss`` address of a normalised address of any bridge."""
+    parts = urlsplit(url)
+    if parts.scheme not in _FOXGLOVE:
+        return url
+    place = parts.netloc
+    if parts.port is None:
+        place = f"{place}:{_DEFAULT_PORT[parts.scheme]}"
+    return urlunsplit(parts._replace(scheme=_FOXGLOVE[parts.scheme], netloc=place))
+
+
 def agent_named(url: str) -> str:
     """Return the agent in an address; empty if it is no address of an agent."""
     return urlsplit(url).path.strip("/") if is_agent_url(url) else ""
@@ -132,7 +153,7 @@ def normalise_url(url: str) -> str:
         ConfigError: If the text is not the address of a bridge.
 
     """
-    hint = "expected one such as 'ws://localhost:9090' or 'wss://robot.example/ros'"
+    hint = "expected one such as 'ws://localhost:9090' or 'foxglove://robot:8765'"
     if not isinstance(url, str) or any(c.isspace() or c < " " for c in url.strip()):
         raise ConfigError(f"{url!r} is not the address of a bridge: {hint}")
     try:

@@ -337,6 +337,7 @@ class Offload:
                     message.topic,
                     view_name(message.__class__),
                     view_name(type),
+                    arguments=list(message.arguments),
                 )
                 worker = _acquire(self)
                 reply = await worker.ask(request, message.frame)

@@ -1,11 +1,14 @@
 """Received messages, the state of a connection, and its counts."""
 
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import msgspec
 
 from webmap.base.errors import ProtocolError
+
+if TYPE_CHECKING:
+    from webmap.ros.serialized.schemas import Schema
 
 LinkState: TypeAlias = Literal["new", "connecting", "open", "closed"]
 
@@ -63,6 +66,19 @@ class ReceivedMessage:
         self._decoded.pop(type, None)
 
     @property
+    def arguments(self) -> tuple[str | None, ...]:
+        """What the constructor needs after the topic and the bytes elsewhere."""
+        return ()
+
+    @property
+    def serialized(self) -> "tuple[Schema, bytes | bytearray] | None":
+        """The message as ROS nodes send it, with its schema; None if it came otherwise.
+
+        The bytes may not fit the schema.
+        """
+        return None
+
+    @property
     def is_binary(self) -> bool:
         """Whether the bytes are not text."""
         raise NotImplementedError
@@ -91,6 +107,9 @@ class BridgeStats:
     bytes: int = 0
     malformed: int = 0
     """Frames that could not be read."""
+
+    unknown: int = 0
+    """Frames with operations that WebMap does not know."""
 
     links: int = 0
     """How often the connection was opened."""

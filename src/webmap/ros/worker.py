@@ -53,7 +53,7 @@ class WorkRequest(msgspec.Struct, array_like=True):
     """``module:name`` of a function of WebMap that returns bytes."""
 
     arguments: list[Any] = []
-    """The further arguments of the function."""
+    """The further arguments of the function, or those of the message's class."""
 
 
 class WorkResult(msgspec.Struct, array_like=True):
@@ -88,7 +88,7 @@ def answer(request: WorkRequest, data: bytes) -> tuple[WorkResult, list[bytes]]:
         if request.call is not None:
             made = _named(request.call)(data, *request.arguments)
             return WorkResult([len(made)]), [made]
-        received = _named(request.message)(request.topic, data)
+        received = _named(request.message)(request.topic, data, *request.arguments)
         received.check_count()
         view = _named(request.view)
         message = received.decode(view)

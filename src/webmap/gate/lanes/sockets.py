@@ -30,7 +30,7 @@ from webmap.gate.clock import now
 from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.navigation import readable
 from webmap.ros.rosbridge.pieces import Pieces
-from webmap.ros.rosbridge.turns import Turn, turns
+from webmap.ros.sockets.turns import Turn, turns
 
 log = logging.getLogger("webmap.gate")
 

@@ -2,8 +2,8 @@
 
 ``link`` is what a :class:`webmap.Bridge` uses; open it first. ``ops`` builds the
 operations that a client sends and ``protocol`` reads those that a bridge sends;
-``connection`` keeps a WebSocket open, and ``wire_subscription`` keeps the subscription
-to one topic. ``graph`` asks rosapi. ``checks`` and ``advice`` are the part of
-``webmap doctor`` that holds for rosbridge alone. ``server`` is the other side of the
-protocol, for the simulator and for recordings.
+``wire_subscription`` keeps the subscription to one topic. ``graph`` asks rosapi.
+``checks`` and ``advice`` are the part of ``webmap doctor`` that holds for rosbridge
+alone. ``server`` is the other side of the protocol, for the simulator and for
+recordings.
 """

@@ -13,9 +13,9 @@ from typing import Any
 from webmap.base.errors import BridgeClosed, ServiceError
 from webmap.base.identifiers import generate_id
 from webmap.ros.rosbridge import ops
-from webmap.ros.rosbridge.connection import BridgeConnection
 from webmap.ros.rosbridge.events import Malformed, ServiceResponse, Status
 from webmap.ros.rosbridge.protocol import Protocol
+from webmap.ros.sockets.connection import BridgeConnection
 
 
 class Calls:

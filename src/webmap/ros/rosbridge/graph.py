@@ -21,7 +21,7 @@ BRIEF = 2.0
 SET_PARAM = "/rosapi/set_param"
 """The service that sets a parameter of ROS 1."""
 
-CLIENTS = ("rosbridge", "webmap")
+CLIENTS = ("rosbridge", "foxglove", "webmap")
 """Parts of the names of nodes that publish for their clients, such as WebMap."""
 
 

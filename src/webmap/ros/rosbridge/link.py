@@ -16,8 +16,14 @@ from webmap.ros.names import split_type
 from webmap.ros.received_message import BridgeStats, ReceivedMessage
 from webmap.ros.rosbridge import ops
 from webmap.ros.rosbridge.calls import Calls
-from webmap.ros.rosbridge.connection import CLOSED_HERE, BridgeConnection
-from webmap.ros.rosbridge.events import CallService, Event, Malformed, Publish, Status
+from webmap.ros.rosbridge.events import (
+    CallService,
+    Event,
+    Malformed,
+    Publish,
+    Status,
+    Unknown,
+)
 from webmap.ros.rosbridge.graph import BridgeGraph
 from webmap.ros.rosbridge.protocol import Protocol
 from webmap.ros.rosbridge.wire_subscription import (
@@ -26,6 +32,7 @@ from webmap.ros.rosbridge.wire_subscription import (
     Renewals,
     WireSubscription,
 )
+from webmap.ros.sockets.connection import CLOSED_HERE, BridgeConnection
 from webmap.ros.subscriptions import Topic
 
 log = logging.getLogger("webmap.ros")
@@ -227,6 +234,8 @@ class RosbridgeLink:
             if not self._complained:
                 self._complained = True
                 self._complain(event)
+        elif isinstance(event, Unknown):
+            self.stats.unknown += 1
         elif isinstance(event, Status) and event.level == "error":
             text = one_line(event.msg)
             log.warning("%s: the bridge reports an error: %s", self._name, text)

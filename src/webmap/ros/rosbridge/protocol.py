@@ -31,7 +31,7 @@ from webmap.ros.rosbridge.events import (
     Unknown,
     check_count,
 )
-from webmap.ros.rosbridge.frame_reader import SHORTENED
+from webmap.ros.sockets.frame_reader import SHORTENED, whole_of
 
 
 def decode_png(data: str, *, max_bytes: int = MAX_OTHER) -> bytes:
@@ -281,7 +281,7 @@ class Protocol:
     ) -> Event | None:
         size = len(frame)
         if frame.startswith(SHORTENED):
-            size, frame = _whole_of(frame)
+            size, frame = whole_of(frame)
             if (topic := topic_in_head(frame)) is not None:
                 return Publish(topic, frame, size)
         if size > MAX_FRAME:
@@ -325,20 +325,6 @@ class Protocol:
         ):
             raise ProtocolError("a PNG that holds another wrapping")
         return self._read(frame, now, nested=True)
-
-
-def _whole_of(frame: bytes | bytearray) -> tuple[int, bytes | bytearray]:
-    """Return the length of a message of which only the beginning came, and that.
-
-    Raises:
-        ProtocolError: If it is no such message.
-
-    """
-    start = len(SHORTENED) + 8
-    size = int.from_bytes(frame[len(SHORTENED) : start], "big")
-    if size <= MAX_FRAME:
-        raise ProtocolError("a frame that begins like a shortened one")
-    return size, frame[start:]
 
 
 def _check_other(frame: bytes | bytearray) -> None:

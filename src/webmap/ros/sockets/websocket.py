@@ -6,9 +6,12 @@ be 256 KiB and 128,000 frames, and passes each message through a queue to a task
 
 import asyncio
 import math
+import socket
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from contextvars import copy_context
+from functools import partial
 
 from websockets.asyncio.client import ClientConnection
 from websockets.frames import DATA_OPCODES, CloseCode, Frame
@@ -16,8 +19,8 @@ from websockets.http11 import Request, Response
 from websockets.protocol import State
 
 from webmap.base.errors import ProtocolError
-from webmap.ros.rosbridge.frame_reader import FrameReader, ignore
-from webmap.ros.rosbridge.turns import SHARE, Turn, turns
+from webmap.ros.sockets.frame_reader import FrameReader, ignore
+from webmap.ros.sockets.turns import SHARE, Turn, turns
 
 MAX_WAITING = 1 << 20
 """Bytes that may wait for their turn; above that, reading stops."""
@@ -54,6 +57,19 @@ class WebSocketConnection(ClientConnection):
         self._rests_until = 0.0
         self._lost = self._finished = False
         self._lost_by: Exception | None = None
+        self._acknowledge: Callable[[], None] | None = None
+
+    def acknowledge_at_once(self) -> None:
+        """Acknowledge all bytes at once, where the system can.
+
+        A server without ``TCP_NODELAY`` sends nothing small while the system delays the
+        acknowledgement of earlier bytes, which Linux does for up to 40 ms.
+        """
+        peer = self.transport.get_extra_info("socket")
+        if peer is not None and hasattr(socket, "TCP_QUICKACK"):
+            self._acknowledge = partial(
+                peer.setsockopt, socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1
+            )
 
     def deliver_to(self, receive: Callable[[bytes | bytearray], None]) -> None:
         """Call ``receive`` with each message; those that came before have waited."""
@@ -68,6 +84,9 @@ class WebSocketConnection(ClientConnection):
     def data_received(self, data: bytes) -> None:
         """Keep bytes until the connection has its turn."""
         self.bytes_came = time.monotonic()
+        if self._acknowledge is not None:  # Linux forgets it after some packets
+            with suppress(OSError):
+                self._acknowledge()
         self._incoming.feed(data)
         if len(self._incoming) > MAX_WAITING and self._reading:
             self._reading = False

@@ -1,11 +1,11 @@
-"""One WebSocket connection to a rosbridge, kept open or opened once."""
+"""One WebSocket connection to a bridge, kept open or opened once."""
 
 import asyncio
 import logging
 import socket
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from math import inf
 from typing import TYPE_CHECKING
@@ -17,7 +17,7 @@ from webmap.ros.limits import MAX_FRAME
 from webmap.ros.received_message import LinkState
 
 if TYPE_CHECKING:
-    from webmap.ros.rosbridge.websocket import WebSocketConnection
+    from webmap.ros.sockets.websocket import WebSocketConnection
 
 log = logging.getLogger("webmap.ros")
 
@@ -44,6 +44,8 @@ class BridgeConnection:
         again: Whether to reopen it whenever it ends or fails.
         busy: Returns whether the bridge may be busy with a large message that was
             requested.
+        subprotocols: The subprotocols to offer; the bridge must accept one of them.
+        named: How errors name the bridge: its kind.
 
     """
 
@@ -57,6 +59,8 @@ class BridgeConnection:
         failed: Callable[[BridgeClosed], None],
         again: bool = True,
         busy: Callable[[], bool] = lambda: False,
+        subprotocols: Sequence[str] = (),
+        named: str = "rosbridge",
     ) -> None:
         self.url = url
         self.state: LinkState = "new"
@@ -70,6 +74,8 @@ class BridgeConnection:
         self._failed = failed
         self._again = again
         self._busy = busy
+        self._subprotocols = subprotocols
+        self._named = named
         self._task: asyncio.Task[None] | None = None
         self._unsent: deque[bytes] = deque()
         self._unsent_size = 0
@@ -102,7 +108,7 @@ class BridgeConnection:
         self.state = "closed"
 
     def send(self, frame: bytes) -> None:
-        """Send ``frame`` as text, now.
+        """Send ``frame`` now: as text if it is JSON, which begins with a brace.
 
         Raises:
             BridgeClosed: If the connection is not open, or accepts no more data.
@@ -139,9 +145,9 @@ class BridgeConnection:
     async def _one_link(self) -> float:
         """Connect, serve the connection until it ends, and return its duration."""
         try:
-            link = await _connect(self.url)
+            link = await _connect(self.url, self._subprotocols)
         except Exception as error:  # name lookup, TCP, TLS, handshake: all the same
-            self._failed(_not_reached(self.url, error))
+            self._failed(_not_reached(self._named, self.url, error))
             return 0.0
         began = time.monotonic()
         reason = CLOSED_HERE
@@ -198,7 +204,7 @@ class BridgeConnection:
                 self._wake.clear()
                 while self._unsent:
                     frame = self._unsent.popleft()
-                    await socket.send(frame, text=True)
+                    await socket.send(frame, text=frame.startswith(b"{"))
                     self._unsent_size -= len(frame)
         except ConnectionClosed:
             pass  # the reader reports it
@@ -231,12 +237,13 @@ class BridgeConnection:
         liveness.ponged(time.monotonic())
 
 
-async def _connect(url: str) -> "WebSocketConnection":
-    await load("webmap.ros.rosbridge.websocket")
+async def _connect(url: str, subprotocols: Sequence[str]) -> "WebSocketConnection":
+    await load("webmap.ros.sockets.websocket")
 
     from websockets.asyncio.client import connect
+    from websockets.typing import Subprotocol
 
-    from webmap.ros.rosbridge.websocket import CLOSE_TIMEOUT, WebSocketConnection
+    from webmap.ros.sockets.websocket import CLOSE_TIMEOUT, WebSocketConnection
 
     class ConnectHere(connect):
         """Connect to the given address, without redirects."""
@@ -247,6 +254,7 @@ async def _connect(url: str) -> "WebSocketConnection":
     socket = await ConnectHere(
         url,
         compression=None,
+        subprotocols=[Subprotocol(name) for name in subprotocols] or None,
         max_size=MAX_FRAME,
         open_timeout=CONNECT_TIMEOUT,
         ping_interval=None,
@@ -256,6 +264,14 @@ async def _connect(url: str) -> "WebSocketConnection":
         create_connection=WebSocketConnection,
     )
     assert isinstance(socket, WebSocketConnection)
+    if subprotocols and socket.subprotocol is None:
+        await _close(socket)
+        raise ConnectionError(
+            f"the server there accepts none of {', '.join(subprotocols)}: it is of "
+            "another kind, such as a rosbridge, whose address begins with ws://"
+        )
+    if subprotocols:
+        socket.acknowledge_at_once()
     return socket
 
 
@@ -265,7 +281,7 @@ async def _close(socket: "WebSocketConnection") -> None:
             await socket.close()
 
 
-def _not_reached(url: str, error: Exception) -> BridgeClosed:
+def _not_reached(named: str, url: str, error: Exception) -> BridgeClosed:
     if isinstance(error, TimeoutError):
         why = f"no answer within {CONNECT_TIMEOUT:g} s"
     elif isinstance(error, ConnectionRefusedError):
@@ -274,7 +290,12 @@ def _not_reached(url: str, error: Exception) -> BridgeClosed:
         why = f"the host's name is not known ({error.strerror})"
     else:
         why = str(error) or type(error).__name__
-    closed = BridgeClosed(f"cannot reach the rosbridge at {url}: {why}")
+    if "HTTP 400" in why and named == "rosbridge":
+        address = url.replace("ws", "foxglove", 1)
+        why += f"; if a Foxglove bridge is there, its address is {address}"
+    elif "HTTP 400" in why:
+        why += ": it accepts none of the subprotocols that WebMap knows"
+    closed = BridgeClosed(f"cannot reach the {named} at {url}: {why}")
     closed.why = why
     closed.__cause__ = error
     return closed

@@ -23,7 +23,7 @@ MOST_FRAGMENTS = 4096
 
 SHORTENED = b"\0shortened\0"
 """The start of a message that replaces a longer one: its length in 8 bytes and its
-first bytes follow. No message of rosbridge begins like this.
+first bytes follow. No message of a bridge begins like this.
 """
 
 KEPT = 1024
@@ -188,6 +188,20 @@ class FrameReader:
         if self._ends:
             self._open, self.came_long = None, len(message)
             self.message(message)
+
+
+def whole_of(message: bytes | bytearray) -> tuple[int, bytes | bytearray]:
+    """Return the length of a message that came shortened, and its first bytes.
+
+    Raises:
+        ProtocolError: If it is no such message.
+
+    """
+    start = len(SHORTENED) + 8
+    size = int.from_bytes(message[len(SHORTENED) : start], "big")
+    if size <= MAX_FRAME:
+        raise ProtocolError("a frame that begins like a shortened one")
+    return size, message[start:]
 
 
 def ignore(_message: bytes | bytearray) -> None:

@@ -1,0 +1,537 @@
+"""One connection to a Foxglove server: what the server offers, and what was asked."""
+
+import asyncio
+import itertools
+import logging
+import time
+from collections.abc import Callable, Iterable
+from functools import partial
+from typing import Any, NamedTuple, TypeVar
+
+from webmap.base.errors import BridgeClosed, BridgeError, ProtocolError, ServiceError
+from webmap.base.text import one_line
+from webmap.ros.foxglove import protocol
+from webmap.ros.foxglove.messages import (
+    FoxgloveMessage,
+    RawMessage,
+    format_of_channel,
+    is_readable,
+)
+from webmap.ros.foxglove.protocol import (
+    Advertise,
+    AdvertiseServices,
+    Channel,
+    ConnectionGraphUpdate,
+    Event,
+    Malformed,
+    MessageData,
+    ParameterValues,
+    ServerInfo,
+    Service,
+    ServiceCallFailure,
+    ServiceCallResponse,
+    Status,
+    Time,
+    Unadvertise,
+    UnadvertiseServices,
+    Unknown,
+)
+from webmap.ros.names import normalise_topic, same_type, web_socket_url
+from webmap.ros.received_message import BridgeStats, ReceivedMessage
+from webmap.ros.sockets.connection import BridgeConnection
+from webmap.ros.sockets.frame_reader import SHORTENED, whole_of
+from webmap.ros.subscriptions import Topic
+
+log = logging.getLogger("webmap.ros")
+
+MOST_OFFERED = 10_000
+"""Most channels, and most services, of one server; others are left out."""
+
+MOST_STATUSES = 20
+"""Most different remarks of the server that are reported for one connection."""
+
+ERROR = 2
+"""The level of a remark that is an error."""
+
+T = TypeVar("T")
+
+
+class _Subscribed(NamedTuple):
+    topic: Topic
+    channel: Channel
+    message: Callable[[str, bytes | bytearray], ReceivedMessage]
+    """Makes a message of its topic and its frame."""
+
+
+class Session:
+    """One connection to a Foxglove server, and what the server has offered on it.
+
+    Args:
+        url: The address, ``foxglove://host:port``.
+        name: The bridge's name, as shown to people.
+        stats: The counts of the bridge.
+        opened: Called when the connection is open.
+        informed: Called when the server has introduced itself on a connection.
+        closed: Called with the reason when an open connection has ended.
+        failed: Called with the error when the connection could not be opened.
+        received: Called with each message of a topic.
+        report: Called with each error that a person may need to know.
+        carries: Returns whether messages of a type come over this connection.
+        elsewhere: Called when a topic is offered whose messages come over another one.
+        again: Whether to reopen the connection whenever it ends or fails.
+
+    """
+
+    def __init__(
+        self,
+        url: str,
+        name: str,
+        stats: BridgeStats,
+        *,
+        opened: Callable[[], None] = lambda: None,
+        informed: Callable[[], None] = lambda: None,
+        closed: Callable[[str], None] = lambda _reason: None,
+        failed: Callable[[BridgeClosed], None] = lambda _error: None,
+        received: Callable[[Topic, ReceivedMessage], object] = lambda *_: None,
+        report: Callable[[Exception], None] = lambda _error: None,
+        carries: Callable[[str], bool] = lambda _type: True,
+        elsewhere: Callable[[], None] = lambda: None,
+        again: bool = True,
+    ) -> None:
+        self.info: ServerInfo | None = None
+        self.services: dict[str, Service] = {}
+        self.publishers: dict[str, list[str]] = {}
+        self.subscribers: dict[str, list[str]] = {}
+        self.failure: BridgeClosed | None = None
+        """Why the connection is not open, after an attempt or a loss."""
+        self.unanswered = False
+        """Whether a call got no answer in time."""
+        self.topics: dict[str, Topic] = {}
+        """The topics to subscribe to, as soon as they are offered."""
+        self.time: tuple[int, float] | None = None
+        """The newest time of the server, in nanoseconds, and when it came."""
+        self._name = name
+        self._stats = stats
+        self._on_open = opened
+        self._informed = informed
+        self._on_close = closed
+        self._on_failure = failed
+        self._on_message = received
+        self._report = report
+        self._carries = carries
+        self._elsewhere = elsewhere
+        self._changed = asyncio.Event()
+        self._ids = itertools.count(1)
+        self._forget()
+        self.connection = BridgeConnection(
+            web_socket_url(url),
+            opened=self._opened,
+            received=self._received,
+            closed=self._closed,
+            failed=self._failed,
+            again=again,
+            subprotocols=protocol.SUBPROTOCOLS,
+            named="Foxglove bridge",
+        )
+
+    def _forget(self) -> None:
+        """Forget the server of an earlier connection."""
+        self.info = None
+        self.services = {}
+        self.publishers, self.subscribers = {}, {}
+        self.time = None
+        self._channels: dict[int, Channel] = {}
+        self._by_topic: dict[str, dict[int, Channel]] = {}
+        self._subscribed: dict[int, _Subscribed] = {}
+        """What the ids of subscriptions mean."""
+        self._id_of: dict[str, int] = {}
+        self._calls: dict[int, asyncio.Future[bytes]] = {}
+        self._questions: dict[str, asyncio.Future[ParameterValues]] = {}
+        self._server_time = False
+        self._statuses: set[str] = set()
+        self._complained = False
+
+    def send(self, frame: bytes) -> None:
+        """Send a frame now; BridgeClosed if the connection is not open."""
+        self.connection.send(frame)
+
+    # What the server offers.
+
+    def channels_of(self, topic: str) -> Iterable[Channel]:
+        """Return the readable channels of a topic."""
+        return self._by_topic.get(topic, {}).values()
+
+    def offered(self) -> dict[str, str]:
+        """Return the type of each readable topic."""
+        return {
+            topic: next(iter(channels.values())).schema_name
+            for topic, channels in self._by_topic.items()
+        }
+
+    def channel_with(self, type: str) -> Channel | None:
+        """Return a channel that has the schema of a type, if there is one."""
+        for channel in self._channels.values():
+            if channel.schema and same_type(channel.schema_name, type):
+                return channel
+        return None
+
+    async def wait_for(self, look: Callable[[], T | None], patience: float) -> T | None:
+        """Return what ``look`` finds in what the server offers, now or later.
+
+        Args:
+            look: Called after each change; None if the thing is not there.
+            patience: Longest wait, in seconds; then the result is None.
+
+        Raises:
+            BridgeClosed: If the connection cannot be opened, or ends.
+
+        """
+        try:
+            async with asyncio.timeout(patience):
+                while (found := look()) is None:
+                    if self.failure is not None:
+                        raise BridgeClosed(str(self.failure)) from self.failure
+                    await self._changed.wait()
+        except TimeoutError:
+            return None
+        return found
+
+    # Subscriptions.
+
+    def subscribe(self, topic: Topic) -> None:
+        """Subscribe as the listeners need it, now or when the server offers the topic.
+
+        A call for a topic that is subscribed applies changes of its listeners.
+        """
+        self.topics[topic.name] = topic
+        id = self._id_of.get(topic.name)
+        if id is not None:
+            channel = self._subscribed[id].channel
+            if _fits(topic, channel):
+                self._subscribed[id] = _subscribed(topic, channel)
+                return
+            self.unsubscribe(topic)
+            self.topics[topic.name] = topic
+        self._subscribe([topic.name])
+
+    def unsubscribe(self, topic: Topic) -> None:
+        """End the subscription to a topic."""
+        self.topics.pop(topic.name, None)
+        id = self._id_of.pop(topic.name, None)
+        if id is not None:
+            del self._subscribed[id]
+            self._send(protocol.unsubscribe([id]))
+
+    def _subscribe(self, names: Iterable[str]) -> None:
+        """Subscribe to those topics that are wanted, offered and carried here."""
+        new: dict[int, int] = {}
+        for name in names:
+            topic = self.topics.get(name)
+            if topic is None or name in self._id_of:
+                continue
+            channel = self._choose(topic)
+            if channel is None:
+                continue
+            if not self._carries(channel.schema_name):
+                self._elsewhere()
+                continue
+            id = next(self._ids)
+            self._id_of[name] = id
+            self._subscribed[id] = _subscribed(topic, channel)
+            new[id] = channel.id
+        if new:
+            self._send(protocol.subscribe(new))
+
+    def _choose(self, topic: Topic) -> Channel | None:
+        channels = self.channels_of(topic.name)
+        return next((each for each in channels if _fits(topic, each)), None)
+
+    # Questions.
+
+    async def call(self, service: Service, encoding: str, request: bytes) -> bytes:
+        """Call a service and return the bytes of its response.
+
+        Raises:
+            ServiceError: If the call fails.
+            BridgeClosed: If the connection ends before the response.
+
+        """
+        id = next(self._ids)
+        answer: asyncio.Future[bytes] = asyncio.Future()
+        self._calls[id] = answer
+        try:
+            self.send(protocol.call_service(service.id, id, encoding, request))
+            return await answer
+        finally:
+            self._calls.pop(id, None)
+
+    async def set_parameters(
+        self, parameters: Iterable[protocol.Parameter]
+    ) -> ParameterValues:
+        """Set parameters and return their new values.
+
+        Raises:
+            BridgeClosed: If the connection ends before the answer.
+
+        """
+        id = f"webmap-{next(self._ids)}"
+        answer: asyncio.Future[ParameterValues] = asyncio.Future()
+        self._questions[id] = answer
+        try:
+            self.send(protocol.set_parameters(parameters, id))
+            return await answer
+        finally:
+            self._questions.pop(id, None)
+
+    @property
+    def waits(self) -> bool:
+        """Whether a call or a question is not answered yet."""
+        return bool(self._calls or self._questions)
+
+    # The connection.
+
+    def _send(self, frame: bytes) -> None:
+        """Send a frame if connected; a new connection repeats it anyway."""
+        if self.connection.state == "open":
+            try:
+                self.send(frame)
+            except BridgeError as error:
+                self._report(error)
+
+    def _opened(self) -> None:
+        self._forget()
+        self.failure = None
+        self._on_open()
+        self._has_changed()
+
+    def _closed(self, reason: str) -> None:
+        error = BridgeClosed(f"{self.connection.url}: {reason}")
+        error.why = reason
+        self._end(error)
+        self._on_close(reason)
+
+    def _failed(self, error: BridgeClosed) -> None:
+        self._end(error)
+        self._on_failure(error)
+
+    def _end(self, error: BridgeClosed) -> None:
+        self.failure = error
+        waiting: list[asyncio.Future[Any]] = [
+            *self._calls.values(),
+            *self._questions.values(),
+        ]
+        for answer in waiting:
+            if not answer.done():
+                answer.set_exception(error)
+        self._forget()
+        self._has_changed()
+
+    def _has_changed(self) -> None:
+        """Let those who wait for something of the server look again."""
+        self._changed.set()
+        self._changed = asyncio.Event()
+
+    def _received(self, frame: bytes | bytearray) -> None:
+        self._stats.frames += 1
+        self._stats.bytes += len(frame)
+        size = len(frame)
+        if frame.startswith(SHORTENED):
+            try:
+                size, frame = whole_of(frame)
+            except ProtocolError as error:
+                self._other(Malformed(str(error), size))
+                return
+        event = protocol.receive(frame)
+        if isinstance(event, MessageData):
+            self._message(event, frame, size)
+        else:
+            self._other(event)
+
+    def _message(self, event: MessageData, frame: bytes | bytearray, size: int) -> None:
+        subscribed = self._subscribed.get(event.subscription_id)
+        if subscribed is None:
+            return  # it was on its way when the subscription ended
+        if not self._server_time:
+            self.time = (event.time, time.monotonic())
+        message = subscribed.message(subscribed.topic.name, frame)
+        message.size = size
+        self._on_message(subscribed.topic, message)
+
+    def _other(self, event: Event) -> None:
+        handle = _HANDLERS.get(type(event))
+        if handle is not None:
+            handle(self, event)
+
+    def _take_info(self, event: ServerInfo) -> None:
+        first, self.info = self.info is None, event
+        if not first:  # only its session is new
+            return
+        if "connectionGraph" in event.capabilities:
+            self._send(protocol.subscribe_connection_graph())
+        self._informed()
+        self._has_changed()
+
+    def _take_channels(self, event: Advertise) -> None:
+        faults, names, left_out = list(event.faults), [], 0
+        for channel in event.channels:
+            if not is_readable(channel):
+                continue
+            if channel.id in self._channels:  # it may have another schema now
+                ended = self._remove([channel.id])
+                if ended:
+                    self._send(protocol.unsubscribe(ended.values()))
+            if len(self._channels) >= MOST_OFFERED:
+                left_out += 1
+                continue
+            name = normalise_topic(channel.topic)
+            self._channels[channel.id] = channel
+            self._by_topic.setdefault(name, {})[channel.id] = channel
+            names.append(name)
+        if left_out:
+            faults.append(
+                f"{left_out} more channels than {MOST_OFFERED}, which are left out"
+            )
+        self._complain_about(faults, "channels")
+        self._subscribe(names)
+        self._has_changed()
+
+    def _drop_channels(self, event: Unadvertise) -> None:
+        self._subscribe(self._remove(event.channel_ids))
+        self._has_changed()
+
+    def _remove(self, ids: Iterable[int]) -> dict[str, int]:
+        """Forget channels; return the subscriptions that have ended, by topic."""
+        ended = {}
+        for id in ids:
+            channel = self._channels.pop(id, None)
+            if channel is None:
+                continue
+            name = normalise_topic(channel.topic)
+            left = self._by_topic[name]
+            del left[id]
+            if not left:
+                del self._by_topic[name]
+            subscription = self._id_of.get(name)
+            if subscription is None:
+                continue
+            if self._subscribed[subscription].channel.id == id:
+                del self._subscribed[subscription], self._id_of[name]
+                ended[name] = subscription
+        return ended
+
+    def _take_services(self, event: AdvertiseServices) -> None:
+        faults = list(event.faults)
+        room = MOST_OFFERED - len(self.services)
+        if len(event.services) > room:
+            faults.append(f"more than {MOST_OFFERED} services; the rest is left out")
+        for service in event.services[: max(0, room)]:
+            self.services[service.name] = service
+        self._complain_about(faults, "services")
+        self._has_changed()
+
+    def _drop_services(self, event: UnadvertiseServices) -> None:
+        gone = set(event.service_ids)
+        self.services = {
+            name: each for name, each in self.services.items() if each.id not in gone
+        }
+
+    def _complain_about(self, faults: list[str], things: str) -> None:
+        if faults:
+            text = (
+                f"{self._name} offers {len(faults)} {things} that cannot be used: "
+                f"{one_line(faults[-1])}"
+            )
+            log.warning("%s", text)
+            self._report(ProtocolError(text))
+
+    def _take_graph(self, event: ConnectionGraphUpdate) -> None:
+        for published in event.published_topics:
+            self.publishers[published.name] = published.publisher_ids
+        for subscribed in event.subscribed_topics:
+            self.subscribers[subscribed.name] = subscribed.subscriber_ids
+        for name in event.removed_topics:
+            self.publishers.pop(name, None)
+            self.subscribers.pop(name, None)
+        if max(len(self.publishers), len(self.subscribers)) > MOST_OFFERED:
+            self.publishers, self.subscribers = {}, {}  # nothing is known, then
+        self._has_changed()
+
+    def _take_parameters(self, event: ParameterValues) -> None:
+        answer = self._questions.get(event.id or "")
+        if answer is not None and not answer.done():
+            answer.set_result(event)
+
+    def _take_response(self, event: ServiceCallResponse) -> None:
+        answer = self._calls.get(event.call_id)
+        if answer is not None and not answer.done():
+            answer.set_result(event.payload)
+
+    def _take_failure(self, event: ServiceCallFailure) -> None:
+        answer = self._calls.get(event.call_id)
+        if answer is not None and not answer.done():
+            answer.set_exception(ServiceError(one_line(event.message)))
+
+    def _take_time(self, event: Time) -> None:
+        self._server_time = True
+        self.time = (event.time, time.monotonic())
+
+    def _take_status(self, event: Status) -> None:
+        text = one_line(event.message)
+        if text in self._statuses or len(self._statuses) >= MOST_STATUSES:
+            return
+        self._statuses.add(text)
+        if event.level >= ERROR:
+            log.warning("%s: the bridge reports an error: %s", self._name, text)
+            self._report(
+                BridgeError(f"{self._name}: the bridge reports an error: {text}")
+            )
+        else:
+            log.info("%s: the bridge reports: %s", self._name, text)
+
+    def _count(self, _event: Unknown) -> None:
+        self._stats.unknown += 1
+
+    def _complain(self, event: Malformed) -> None:
+        """Report a frame that is not Foxglove's protocol, also to one subscriber."""
+        self._stats.malformed += 1
+        if self._complained:
+            return
+        self._complained = True
+        error = ProtocolError(
+            f"{self._name} sent {event.size} bytes that are not Foxglove's protocol: "
+            f"{one_line(event.reason)}"
+        )
+        log.warning("%s", error, extra={"source": self._name})
+        self._report(error)
+        for topic in self.topics.values():
+            for listener in topic.listeners:
+                if listener.mention(error):
+                    return
+
+
+def _fits(topic: Topic, channel: Channel) -> bool:
+    stated = topic.message_type
+    return stated is None or same_type(stated, channel.schema_name)
+
+
+def _subscribed(topic: Topic, channel: Channel) -> _Subscribed:
+    raw = topic.options().encoding == "raw"
+    kind, format = RawMessage if raw else FoxgloveMessage, format_of_channel(channel)
+    return _Subscribed(topic, channel, partial(kind, format=format))
+
+
+_HANDLERS: dict[type[Any], Callable[[Session, Any], None]] = {
+    ServerInfo: Session._take_info,
+    Status: Session._take_status,
+    Advertise: Session._take_channels,
+    Unadvertise: Session._drop_channels,
+    AdvertiseServices: Session._take_services,
+    UnadvertiseServices: Session._drop_services,
+    ParameterValues: Session._take_parameters,
+    ConnectionGraphUpdate: Session._take_graph,
+    ServiceCallFailure: Session._take_failure,
+    ServiceCallResponse: Session._take_response,
+    Time: Session._take_time,
+    Unknown: Session._count,
+    Malformed: Session._complain,
+}
