@@ -3,7 +3,6 @@
 No I/O, and no picture is decoded. A packet has one picture.
 """
 
-from collections.abc import Iterator
 from typing import NamedTuple, Protocol
 
 from webmap.base.errors import ProtocolError
@@ -50,8 +49,8 @@ class Bits:
         return (1 << zeros) - 1 + self.take(zeros)
 
 
-def nal_units(data: bytes) -> Iterator[tuple[int, int]]:
-    """Yield begin and end of each NAL unit of a packet in Annex B form.
+def nal_units(data: bytes) -> list[tuple[int, int]]:
+    """Return begin and end of each NAL unit of a packet in Annex B form.
 
     Raises:
         ProtocolError: If the packet does not begin with a start code, has too many
@@ -63,15 +62,16 @@ def nal_units(data: bytes) -> Iterator[tuple[int, int]]:
             "a video packet that does not begin with a start code: the encoder must "
             "write Annex B"
         )
+    units: list[tuple[int, int]] = []
     for _ in range(MOST_UNITS):
         begin += len(START)
         following = data.find(START, begin)
         end = len(data) if following < 0 else following
         if end == begin:
             raise ProtocolError("a video packet with an empty NAL unit")
-        yield begin, end
+        units.append((begin, end))
         if following < 0:
-            return
+            return units
         begin = following
     raise ProtocolError(f"a video packet with more than {MOST_UNITS} NAL units")
 
