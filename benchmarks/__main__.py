@@ -33,6 +33,7 @@ ROWS = [
     Row("grids", 25),
     Row("drawing", 25, quick=True),
     Row("latency", 25),
+    Row("video", 40),
     Row("peers", 25),
     Row("limits", 45),
     Row("console", 60),

@@ -81,12 +81,22 @@ def test_the_agent_does_not_limit_the_rate_of_changes_as_each_of_them_counts():
     assert bench.took()[0]["throttle_rate"] == 1
 
 
+def test_the_agent_gets_video_in_a_binary_encoding_and_with_a_queue(bench):
+    type = "foxglove_msgs/CompressedVideo"
+    wanted = {"type": type, "queue_length": 10, "compression": "cbor"}
+    bench.subscribe(ANN, "/video", throttle_rate=1, **wanted)
+    asked = bench.took()[0]
+    assert {key: asked[key] for key in wanted} == wanted
+
+
 @pytest.mark.parametrize(
     ("topic", "type", "every"),
     [
         ("/markers", "visualization_msgs/MarkerArray", True),
         ("/map_updates", "map_msgs/OccupancyGridUpdate", True),
         ("/tf_static", "tf2_msgs/TFMessage", True),
+        ("/video", "foxglove_msgs/CompressedVideo", True),
+        ("/ffmpeg", "ffmpeg_image_transport_msgs/FFMPEGPacket", True),
         ("/map", "nav_msgs/OccupancyGrid", False),
         ("/odom", None, False),
     ],

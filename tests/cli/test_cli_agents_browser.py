@@ -1,13 +1,14 @@
 """A router, agents and displays as separate processes, in a real browser."""
 
 import re
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 import pytest
 from playwright.sync_api import expect
 
 from equipment.camera_server import CameraServer
 from equipment.chromium import end_stops, hold, watched_tab
+from equipment.video_publisher import VideoPublisher
 from equipment.webmap_process import page_of, simulator, webmap
 from webmap.base.tasks import LoopThread
 
@@ -284,3 +285,24 @@ def test_the_page_shows_the_camera_and_the_picture_of_an_agents_robot(
             first = front.get_attribute("src")
             expect(front).not_to_have_attribute("src", first, timeout=SOON)
             assert camera.open == 1
+
+
+def test_the_page_shows_the_video_of_an_agents_robot(chromium, tmp_path):
+    with (
+        webmap("router", "--listen", "tcp/127.0.0.1:0") as router,
+        simulator("--robots", "1") as url,
+        ExitStack() as ends,
+    ):
+        publisher = VideoPublisher(url, "/robot_0/video")
+        ends.callback(publisher.stop)
+        with (
+            agent(tmp_path, url, router, "bay1"),
+            display(chromium, router) as page,
+        ):
+            expect(placed(page)).to_have_count(1, timeout=SOON)
+            page.locator("#robots .row button").first.click()
+            video = page.locator("#card .camera-video canvas")
+            expect(video).to_have_js_property("width", 160, timeout=SOON)
+            expect(page.locator("#card .camera-video")).not_to_have_class(
+                re.compile("stale")
+            )

@@ -64,6 +64,15 @@ def test_several_cameras_get_different_names(read):
             '{topic = "/a", throtle = 5}',
             'cameras.throtle: there is no key "throtle" here; did you mean "throttle"?',
         ),
+        (
+            '{topic = "/a/ffmpeg", throttle = 5}',
+            "cameras.throttle: a video has no throttle",
+        ),
+        (
+            '{url = "http://bob/", type = "sensor_msgs/Image"}',
+            'cameras.type: only a camera with a "topic" has a type',
+        ),
+        ('{topic = "/a", type = "std_msgs/Bool"}', "expected one of the types"),
         ('{topic = "/a", throttle = -5}', "expected a whole number of milliseconds"),
         (
             '[{topic = "/a", name = "Arm"}, {topic = "/b", name = "arm"}]',
@@ -90,5 +99,40 @@ def test_discovered_cameras_in_a_fleet_file_get_different_names(tmp_path):
     assert {camera.name: camera.topic for camera in cameras} == {
         "Camera 1": "/cam1/image_raw/compressed",
         "Camera 2": "/cam2/image_raw/compressed",
+    }
+    robot.destroy()
+
+
+def test_a_video_is_known_by_its_type_or_by_the_name_of_its_topic(read):
+    cameras = read(
+        '["/front/image_raw/ffmpeg", "/rear/image_raw/foxglove", '
+        '{topic = "/arm", type = "foxglove_msgs/msg/CompressedVideo"}, '
+        '{topic = "/x/ffmpeg", type = "sensor_msgs/Image"}]'
+    )
+    kinds = [(type(camera).__name__, camera.type) for camera in cameras]
+    assert kinds == [
+        ("VideoCamera", "ffmpeg_image_transport_msgs/FFMPEGPacket"),
+        ("VideoCamera", "foxglove_msgs/CompressedVideo"),
+        ("VideoCamera", "foxglove_msgs/CompressedVideo"),
+        ("Camera", "sensor_msgs/Image"),
+    ]
+
+
+def test_discovered_videos_in_a_fleet_file_are_videos(tmp_path):
+    topics = {
+        "/odom": "nav_msgs/msg/Odometry",
+        "/cam/image_raw/compressed": "sensor_msgs/msg/CompressedImage",
+        "/cam/image_raw/ffmpeg": "ffmpeg_image_transport_msgs/msg/FFMPEGPacket",
+        "/dash": "foxglove_msgs/msg/CompressedVideo",
+    }
+    file = tmp_path / "fleet.toml"
+    file.write_text(fleet_toml([("hall", "ws://hall:9090", discover(topics, "bob"))]))
+    (robot,) = prepare(file).robots
+    cameras = [module for module in robot.modules if hasattr(module, "watch")]
+    kinds = {camera.topic: type(camera).__name__ for camera in cameras}
+    assert kinds == {
+        "/cam/image_raw/compressed": "Camera",
+        "/cam/image_raw/ffmpeg": "VideoCamera",
+        "/dash": "VideoCamera",
     }
     robot.destroy()

@@ -41,6 +41,8 @@ PARSERS = {
     "agents.data_messages:lean_scan": (5,),
     "agents.data_messages:read_op": (),
     "agents.data_messages:unpack": (),
+    "features.cameras.video_codecs:nal_units": (),
+    "features.cameras.video_codecs:read_sps": (),
     "features.tiles.tile_source:media_type": ("tile",),
     "fleet.robot_files:check_agent_picture": (FILE, "image/png"),
     "fleet.robot_files:check_picture": (FILE, "image/svg+xml"),
@@ -65,6 +67,10 @@ PARSERS = {
 
 STREAMS = {
     "agents.gate_messages:Order": ("take",),
+    "features.cameras.video_codecs:Av1": ("read",),
+    "features.cameras.video_codecs:H264": ("read",),
+    "features.cameras.video_codecs:H265": ("read",),
+    "features.cameras.video_codecs:Vp9": ("read",),
     "gate.pipe:Unpacker": ("feed", FromGate),
     "ros.image_pull:HttpResponseParser": ("feed",),
     "ros.image_pull:Multipart": ("feed", "boundary"),

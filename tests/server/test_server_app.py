@@ -83,9 +83,10 @@ def test_every_socket_needs_a_sign_in_and_the_origin_before_the_upgrade(
     app, stranger, client
 ):
     sockets = [route for route in app.routes if isinstance(route, WebSocketRoute)]
-    assert len(sockets) == 2
+    assert len(sockets) == 3
     for route in sockets:
-        url = socket_url(route.path.rpartition("/")[2], id="p")
+        name = route.path.removeprefix("/_webmap/").replace("{tag}", "x")
+        url = socket_url(name, id="p")
         assert refused(stranger, url, ORIGIN) == 401
         assert refused(client, url, {}) == 403
         assert refused(client, url, {"origin": "http://127.0.0.1:9000"}) == 403

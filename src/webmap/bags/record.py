@@ -17,7 +17,7 @@ from webmap.base.echo import echo
 from webmap.base.errors import BridgeError, ConfigError, ServiceError
 from webmap.base.text import counted
 from webmap.ros.bridge import Bridge
-from webmap.ros.names import is_type, normalise_topic, split_type
+from webmap.ros.names import PICTURES, is_type, normalise_topic, split_type
 from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.rosbridge.server.dialect import DialectName
 from webmap.ros.temporary_bridge import ask_topics
@@ -205,9 +205,6 @@ SHOW = 1.0
 
 OPEN_WITHIN = 5.0
 """Seconds after which a message states that the connection is not open yet."""
-
-PICTURES = ("sensor_msgs/Image", "sensor_msgs/CompressedImage")
-"""Types requested in binary: a bridge takes long to encode them as text."""
 
 QUEUE = 100
 """Messages of a topic that the bridge may queue; none should be lost."""

@@ -16,7 +16,7 @@ from webmap.config.checks import KeyPath, Mistakes
 from webmap.config.motion import MotionConfig, TopicConfig
 from webmap.config.reading import ONE_OR_MORE, Config, ReadBy, read, tables_of
 from webmap.ros.image_address import EXAMPLE, parse_address
-from webmap.ros.names import is_topic
+from webmap.ros.names import PICTURES, VIDEO, is_topic, is_type
 
 ODOMETRY_TYPES = (
     "nav_msgs/Odometry",
@@ -101,7 +101,19 @@ class CameraConfig(Config, kw_only=True, frozen=True):
     ] = ""
     name: Annotated[str, checks.text] = ""
     """Numbered if not given."""
+    type: Annotated[str, checks.message_type(*PICTURES, *VIDEO)] | None = None
+    """If not given, the name of the topic decides, or the bridge is queried."""
     throttle: Annotated[int, checks.milliseconds] | None = None
+
+    @property
+    def is_video(self) -> bool:
+        """Whether the topic has video, by its type or by the names of image_transport.
+
+        The plugins of image_transport add their own names to that of a camera.
+        """
+        if self.type is not None:
+            return is_type(self.type, *VIDEO)
+        return self.topic.endswith(("/ffmpeg", "/foxglove"))
 
     @classmethod
     def expand(cls, value: Any) -> dict[str, Any]:
@@ -122,6 +134,11 @@ class CameraConfig(Config, kw_only=True, frozen=True):
         """Add mistakes that concern several fields."""
         if bool(self.topic) == bool(self.url):
             mistakes.add(path, 'a camera has either a "topic" or a "url"')
+        if self.url and self.type is not None:
+            mistakes.add((*path, "type"), 'only a camera with a "topic" has a type')
+        if self.is_video and self.throttle is not None:
+            message = "a video has no throttle, because each message counts"
+            mistakes.add((*path, "throttle"), message)
 
 
 class ModuleConfig(Config, kw_only=True, frozen=True):
@@ -320,8 +337,10 @@ class RobotConfig(Config, kw_only=True, frozen=True):
             layers.append(ModuleEntry(("buttons",), buttons))
         for index, camera in enumerate(named_cameras(self.cameras)):
             throttle = camera.throttle
-            options = {} if throttle is None else {"throttle": throttle}
-            kind = "HttpCamera" if camera.url else "Camera"
+            given = {"throttle": throttle, "type": camera.type}
+            options = {key: value for key, value in given.items() if value is not None}
+            kind = "VideoCamera" if camera.is_video else "Camera"
+            kind = "HttpCamera" if camera.url else kind
             where = [camera.url] if camera.url else [link, camera.topic]
             module = ModuleConfig(
                 name=kind, args=[*where, camera.name], options=options

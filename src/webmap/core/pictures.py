@@ -1,11 +1,14 @@
-"""Images that this process draws and serves by URL, without files.
+"""Images and videos that this process serves by URL, without files.
 
-The model's thread publishes and the web thread serves, hence the lock.
+The model's thread publishes and the web thread serves, hence the locks.
 """
 
 import hashlib
+import secrets
+import struct
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
@@ -123,6 +126,142 @@ class Pictures:
 
 pictures = Pictures()
 """The pictures that the layers of this process drew."""
+
+
+VIDEOS = "/_webmap/video/"
+"""The start of the URL of every video."""
+
+MOST_PACKETS, MOST_PACKET_BYTES = 600, 4 << 20
+"""The greatest number and size of the packets of a video since its last key picture,
+which a new viewer gets. If there are more, it waits for the next key picture."""
+
+KEY = 1
+"""The first byte of a message with a key picture; 0 for all other pictures."""
+
+_PICTURE = struct.Struct("<Bd")
+_CONFIG = struct.Struct("<IIB")
+
+
+class Viewing(NamedTuple):
+    """How one viewer of a video is reached; both are called from any thread."""
+
+    send: Callable[[bytes | str], None]
+    """Sends a message: bytes with a picture, or a text for people."""
+
+    end: Callable[[], None]
+    """Called when the video has ended."""
+
+
+class VideoStream:
+    """A video that changes hands packet by packet, and its viewers.
+
+    A message with a picture is, little-endian: 1 byte :data:`KEY` or 0; 8 bytes, when
+    it was sent, as monotonic seconds; before a key picture, width and height with 4
+    bytes each, 1 byte with the length of the codec's name, and this name; the packet.
+    """
+
+    def __init__(self, tag: str) -> None:
+        self.url = VIDEOS + tag
+        self._lock = threading.Lock()
+        self._viewers: dict[object, Viewing] = {}
+        self._packets: list[bytes] = []
+        self._size = 0
+        self._note = ""
+        self._over = False
+
+    def show(
+        self, data: bytes, config: tuple[str, int, int] | None, stamp: float
+    ) -> None:
+        """Send a picture to all viewers.
+
+        Args:
+            data: The packet.
+            config: Codec, width and height before a key picture; None for others.
+            stamp: When it was sent, in monotonic seconds.
+
+        """
+        message = _PICTURE.pack(KEY if config else 0, stamp)
+        if config is not None:
+            codec, width, height = config
+            name = codec.encode()
+            message += _CONFIG.pack(width, height, len(name)) + name
+        message += data
+        with self._lock:
+            size = self._size + len(message)
+            full = len(self._packets) >= MOST_PACKETS or size > MOST_PACKET_BYTES
+            if config is not None or full:
+                self._packets, self._size = [], 0
+            if config is not None or self._packets:
+                self._packets.append(message)
+                self._size += len(message)
+            self._send(message)
+
+    def lose(self) -> None:
+        """Forget the kept packets: a new viewer waits for the next key picture."""
+        with self._lock:
+            self._packets, self._size = [], 0
+
+    def tell(self, note: str) -> None:
+        """Show a sentence with the video; an empty one removes it."""
+        with self._lock:
+            if note != self._note:
+                self._note = note
+                self._send(note)
+
+    def join(self, viewing: Viewing) -> Removal:
+        """Send a viewer what a decoder needs now, and all that follows."""
+        key = object()
+        with self._lock:
+            if self._over:
+                viewing.end()
+            else:
+                self._viewers[key] = viewing
+                viewing.send(self._note)
+                for message in self._packets:
+                    viewing.send(message)
+        return Removal(lambda: self._leave(key))
+
+    def end(self) -> None:
+        """End the video for all viewers."""
+        with self._lock:
+            self._over, viewers, self._viewers = True, self._viewers, {}
+            self._packets = []
+        videos.discard(self)
+        for viewing in viewers.values():
+            viewing.end()
+
+    def _leave(self, key: object) -> None:
+        with self._lock:
+            self._viewers.pop(key, None)
+
+    def _send(self, message: bytes | str) -> None:
+        for viewing in self._viewers.values():
+            viewing.send(message)
+
+
+class Videos:
+    """The videos that pages may show, each under a URL that nobody can guess."""
+
+    def __init__(self) -> None:
+        self._streams: dict[str, VideoStream] = {}
+
+    def open(self) -> VideoStream:
+        """Return a new video."""
+        tag = secrets.token_hex(16)
+        self._streams[tag] = stream = VideoStream(tag)
+        return stream
+
+    def discard(self, stream: VideoStream) -> None:
+        """Forget a video that has ended."""
+        self._streams.pop(stream.url.removeprefix(VIDEOS), None)
+
+    def get(self, tag: str) -> VideoStream | None:
+        """Return the video whose URL ends in ``tag``; None if there is none."""
+        return self._streams.get(tag)
+
+
+videos = Videos()
+"""The videos of this process."""
 
 
 class Picture:

@@ -20,6 +20,7 @@ from webmap.config.robot import (
     TfConfig,
 )
 from webmap.discovery.tf_robots import MAP, WORLD
+from webmap.ros.names import VIDEO, is_type
 
 TopicRole: TypeAlias = Literal[
     "odometry",
@@ -183,7 +184,7 @@ class FoundRobot:
             motion=self._motion(),
             scan=[scan] if scan else [],
             battery=self.topic("battery"),
-            cameras=[CameraConfig(topic=guess.topic) for guess in cameras],
+            cameras=[_camera(guess) for guess in cameras],
             modules=[drawn] if plan else [],
         )
 
@@ -226,6 +227,14 @@ class Findings:
 
     layers: Mapping[str, Layers] = field(default_factory=dict)
     """The layers drawn and left out of each robot, by its namespace."""
+
+
+def _camera(guess: Guess) -> CameraConfig:
+    # The type is stated where the name does not show that it is video.
+    camera = CameraConfig(topic=guess.topic)
+    if camera.is_video or not is_type(guess.type, *VIDEO):
+        return camera
+    return CameraConfig(topic=guess.topic, type=guess.type)
 
 
 def unique_names(

@@ -23,7 +23,7 @@ from webmap.base.errors import ConfigError
 from webmap.config.motion import TWIST_TYPES
 from webmap.discovery.findings import TopicRole
 from webmap.discovery.tf_robots import BASE, Base, Trees
-from webmap.ros.names import split_type
+from webmap.ros.names import PICTURES, VIDEO, split_type
 
 PARTS = (
     r"[^/]*controller|controllers|mobile_base|base|platform|drive|navigation|nav|"
@@ -43,7 +43,6 @@ BARE_POSES = ("geometry_msgs/Pose", "geometry_msgs/Pose2D")
 VELOCITY = TWIST_TYPES
 GRID = ("nav_msgs/OccupancyGrid",)
 PATH = ("nav_msgs/Path",)
-CAMERA = ("sensor_msgs/CompressedImage", "sensor_msgs/Image")
 
 DEPTH = (
     r"/(?:depth(?:_registered|_image[^/]*)?|aligned_depth[^/]*|image_depth[^/]*|"
@@ -169,10 +168,11 @@ RULES: tuple[Rule, ...] = (
     Rule("costmap", GRID, r"[^/]*costmap[^/]*(?:/[^/]+)?", "named a costmap"),
     Rule("map", GRID, r"map", "the usual name"),
     Rule("map", GRID, r"[^/]+", "its type alone"),
-    Rule("camera", CAMERA[:1], r"[^/]+/compressed", "compressed pictures", DEPTH),
-    Rule("camera", CAMERA[1:], r"[^/]*image[^/]*", "pictures, not compressed", DEPTH),
-    Rule("camera", CAMERA[:1], r"[^/]+", "its type alone", DEPTH),
-    Rule("camera", CAMERA[1:], r"[^/]+", "its type alone", DEPTH),
+    Rule("camera", PICTURES[:1], r"[^/]+/compressed", "compressed pictures", DEPTH),
+    Rule("camera", PICTURES[1:], r"[^/]*image[^/]*", "pictures, not compressed", DEPTH),
+    Rule("camera", PICTURES[:1], r"[^/]+", "its type alone", DEPTH),
+    Rule("camera", PICTURES[1:], r"[^/]+", "its type alone", DEPTH),
+    Rule("camera", VIDEO, r"[^/]+", "video", DEPTH),
     Rule("cloud", ("sensor_msgs/PointCloud2",), r"[^/]+", "its type alone"),
     Rule("tf", ("tf2_msgs/TFMessage",), r"tf", "the frames of the robot"),
 )

@@ -1,4 +1,4 @@
-"""Pictures from cameras: their typed views, their encodings, and their sizes."""
+"""Pictures and video of cameras: their typed views, their encodings, their sizes."""
 
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -349,6 +349,25 @@ class AnyImageMsg(msgspec.Struct):
             self.data,
             self.is_bigendian,
         )
+
+
+class CompressedVideoMsg(msgspec.Struct):
+    """The fields of ``foxglove_msgs/CompressedVideo`` that are used."""
+
+    data: bytes
+    format: str = ""
+
+
+class FfmpegPacketMsg(msgspec.Struct):
+    """The fields of ``ffmpeg_image_transport_msgs/FFMPEGPacket`` that are used."""
+
+    data: bytes
+    encoding: str = ""
+
+    @property
+    def format(self) -> str:
+        """The codec, as in :class:`CompressedVideoMsg`, and what it was made from."""
+        return self.encoding
 
 
 def _media_type(data: bytes) -> str | None:

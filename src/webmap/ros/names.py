@@ -13,11 +13,15 @@ _TYPE = re.compile(
     r"/(?P<name>[A-Za-z][A-Za-z0-9_]*)\Z"
 )
 _HOST = re.compile(r"(?:[A-Za-z0-9.-]+|\[[0-9A-Fa-f:.]+\])(?::\d{1,5})?(?:/[^\s]*)?")
-_DEFAULT_PORT = {
-    **{"ws": 80, "wss": 443},
-    **{"foxglove": 8765, "foxgloves": 8765},
-    **{"zenoh": 7447, "zenohs": 7447},
-}
+_DEFAULT_PORT = {"ws": 80, "wss": 443, "foxglove": 8765, "foxgloves": 8765}
+_DEFAULT_PORT |= {"zenoh": 7447, "zenohs": 7447}
+
+PICTURES = ("sensor_msgs/CompressedImage", "sensor_msgs/Image")
+"""The types of pictures."""
+
+VIDEO = ("foxglove_msgs/CompressedVideo", "ffmpeg_image_transport_msgs/FFMPEGPacket")
+"""The types of video: a message refers to earlier ones, so each of them counts."""
+
 _AGENTS = ("zenoh", "zenohs")
 _FOXGLOVE = {"foxglove": "ws", "foxgloves": "wss"}
 _WITH_GATE = ("ws", "wss", *_AGENTS)

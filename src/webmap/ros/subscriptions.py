@@ -13,7 +13,7 @@ from webmap.base.errors import BridgeError, ConfigError, ProtocolError
 from webmap.base.scope import Scope, current_scope
 from webmap.ros.callbacks import Callback
 from webmap.ros.limits import GENERAL, LARGE, TooLarge, check_size, limit_of
-from webmap.ros.names import is_type, same_type
+from webmap.ros.names import VIDEO, is_type, same_type
 from webmap.ros.received_message import ReceivedMessage
 
 Encoding: TypeAlias = Literal["text", "binary", "raw"]
@@ -33,6 +33,7 @@ CHANGES = (
     "visualization_msgs/Marker",
     "visualization_msgs/MarkerArray",
     "diagnostic_msgs/DiagnosticArray",
+    *VIDEO,
 )
 """Types whose messages change what earlier messages showed, without repeating them."""
 

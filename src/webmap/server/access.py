@@ -23,7 +23,7 @@ KEY = "webmap-key"
 """The element of a page and the header of a request with the page's key."""
 
 PROTOCOL = "webmap"
-"""The subprotocol of both sockets. A page offers it together with its key, as browsers
+"""The subprotocol of all sockets. A page offers it together with its key, as browsers
 let a page set no other header of a WebSocket."""
 
 FRAME = "frame"

@@ -26,6 +26,7 @@ from webmap.base.roles import Role, covers, who_may
 from webmap.core.base_page import PageEntry
 from webmap.core.operators import Viewer
 from webmap.core.page import Site
+from webmap.core.pictures import VIDEOS
 from webmap.core.shift_choice import Choice, csv_of
 from webmap.core.shift_log import shift_log
 from webmap.server.access import Settings
@@ -55,7 +56,13 @@ from webmap.server.security import (
     Security,
     plain,
 )
-from webmap.server.sockets import ConnectToGate, DriveSockets, SceneSockets, find_page
+from webmap.server.sockets import (
+    ConnectToGate,
+    DriveSockets,
+    SceneSockets,
+    VideoSockets,
+    find_page,
+)
 
 log = logging.getLogger("webmap.server")
 
@@ -126,12 +133,15 @@ class WebApp:
         self._sockets = (
             SceneSockets(site, pages, calls, settings.max_pages),
             DriveSockets(pages, connect_to_gate, calls, settings.max_pages),
+            VideoSockets(calls, settings.max_pages),
         )
-        scene, drive = self._sockets
+        scene, drive, video = self._sockets
         self.routes = [
             # Open to every role: each message has a least role of its own.
             WebSocketRoute("/_webmap/scene", scene.serve),
             WebSocketRoute("/_webmap/drive", drive.serve),
+            # As pictures: whoever sees the camera on a page has the tag.
+            WebSocketRoute(VIDEOS + "{tag}", video.serve),
             RouteFor("viewer", "/_webmap/key", _key_fits, methods=["POST"]),
             RouteFor("viewer", "/_webmap/sign-out", self._sign_out, methods=["POST"]),
             RouteFor("viewer", "/_webmap/shift-log.csv", _shift_log, methods=["POST"]),

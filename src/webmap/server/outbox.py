@@ -5,10 +5,13 @@ The only I/O here is to wake the event loop of the sockets.
 
 import asyncio
 import logging
+import time
 import weakref
 from collections import deque
 from collections.abc import Callable
 from functools import partial
+
+from webmap.core.pictures import KEY, MOST_PACKET_BYTES, MOST_PACKETS
 
 log = logging.getLogger("webmap.server")
 
@@ -16,6 +19,9 @@ FRAMES = 8
 FRAME_BYTES = 1024 * 1024
 MESSAGES = 1024
 MESSAGE_BYTES = 1024 * 1024
+
+LATE_S = 0.5
+"""The age in seconds of an unanswered picture of a video at which no more are sent."""
 
 _TICK = '{"op":"tick"'
 
@@ -83,6 +89,65 @@ class DriveQueue:
         item = self._waiting.popleft()
         self._size -= len(item)
         return item
+
+
+class VideoQueue:
+    """The pictures of one video for one page, which answers how many it has received.
+
+    A page with an old unanswered picture is late: its pictures wait. The next key
+    picture replaces all that wait. If too many wait, they are dropped, and all until
+    the next key picture.
+
+    Args:
+        now: Returns monotonic seconds.
+    """
+
+    def __init__(self, now: Callable[[], float] = time.monotonic) -> None:
+        self._now = now
+        self._note: str | None = None
+        self._waiting: deque[bytes] = deque()
+        self._size = 0
+        self._skips = False
+        self._answered = 0
+        self._sent: deque[float] = deque()
+        """When each unanswered picture was sent."""
+
+    def put(self, item: bytes | str) -> bool:
+        """Add a picture, or a note in place of the one that waits; return True."""
+        if isinstance(item, str):
+            self._note = item
+            return True
+        size = self._size + len(item)
+        starts = item[0] == KEY
+        full = len(self._waiting) > MOST_PACKETS or size > 2 * MOST_PACKET_BYTES
+        if starts or full:
+            self._waiting.clear()
+            self._size, self._skips = 0, not starts
+        if not self._skips:
+            self._waiting.append(item)
+            self._size += len(item)
+        return True
+
+    def pop(self) -> bytes | str | None:
+        """Return the note, otherwise the oldest picture unless the page is late."""
+        if self._note is not None:
+            note, self._note = self._note, None
+            return note
+        now = self._now()
+        late = self._sent and now - self._sent[0] > LATE_S
+        if not self._waiting or late:
+            return None
+        item = self._waiting.popleft()
+        self._size -= len(item)
+        self._sent.append(now)
+        return item
+
+    def answer(self, text: str) -> None:
+        """Note how many pictures the page has received in all."""
+        number = int(text) if text.isdecimal() and len(text) < 16 else 0
+        while self._answered < number and self._sent:
+            self._sent.popleft()
+            self._answered += 1
 
 
 class BatchedCalls:

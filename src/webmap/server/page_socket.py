@@ -18,7 +18,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from webmap.base.counts import counts
 from webmap.server.access import FRAME, PROTOCOL
-from webmap.server.outbox import BatchedCalls, DriveQueue, FrameQueue
+from webmap.server.outbox import BatchedCalls, DriveQueue, FrameQueue, VideoQueue
 
 log = logging.getLogger("webmap.server")
 
@@ -73,6 +73,8 @@ class SocketLimits:
 SCENE = SocketLimits(max_bytes=16 * 1024, rate=240.0, burst=480.0)
 # 20 commands a second for the 6 s after which a silent connection is given up.
 DRIVE = SocketLimits(max_bytes=1024, rate=60.0, burst=120.0)
+# An answer to each picture, of which a new viewer gets many at once.
+VIDEO = SocketLimits(max_bytes=32, rate=240.0, burst=1200.0)
 
 OPENS = 2.0
 """Pages that one viewer may open each second."""
@@ -169,7 +171,7 @@ class PageSocket:
         name: str,
         calls: BatchedCalls,
         bounds: SocketLimits,
-        queue: FrameQueue | DriveQueue,
+        queue: FrameQueue | DriveQueue | VideoQueue,
     ) -> None:
         self._socket = socket
         self._name = name
@@ -190,6 +192,10 @@ class PageSocket:
     def offer(self, item: bytes | str) -> None:
         """Send a message soon; callable from any thread."""
         self._calls.call(self._put, item)
+
+    def go_on(self) -> None:
+        """Send what the queue held back; called in the socket's event loop."""
+        self._wake.set()
 
     def end(self, code: int, reason: str) -> None:
         """Close the socket with a reason; callable from any thread."""

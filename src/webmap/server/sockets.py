@@ -1,4 +1,4 @@
-"""The two sockets of a page.
+"""The sockets of a page: two, and one for each video that it shows.
 
 ``/_webmap/scene`` carries the scene to the page, and the page's events back. A page
 sends its hello in the address of the socket, so that the first frame takes one round
@@ -8,6 +8,10 @@ trip less; other programs may send it as their first message.
 is a socket of its own, so that no large message delays a command. The page's messages
 go to the gate unread; only the gate decides. A page beyond the limit can only stop:
 STOP is never refused for lack of room.
+
+``/_webmap/video/TAG`` carries one video. A page got the tag over ``/scene``, because it
+shows the camera. The page answers each picture with the number of those that it has
+received, so that a late page skips to the next key picture.
 """
 
 import ipaddress
@@ -16,6 +20,7 @@ import secrets
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from starlette.websockets import WebSocket
 
@@ -23,13 +28,19 @@ from webmap.base.roles import Role
 from webmap.core.base_page import PageEntry
 from webmap.core.operators import Viewer, operators
 from webmap.core.page import Site
+from webmap.core.pictures import Viewing, videos
 from webmap.core.shift_log import shift_log
 from webmap.gate.commands import Refusal as InvalidCommand
 from webmap.gate.commands import begins_like_stop, op_of, parse, stop_in
 from webmap.gate.display.pages import refused_text
 from webmap.gate.protocol import Identity, Refused
 from webmap.server.open_pages import GateConnection, OpenPages
-from webmap.server.outbox import BatchedCallsByLoop, DriveQueue, FrameQueue
+from webmap.server.outbox import (
+    BatchedCallsByLoop,
+    DriveQueue,
+    FrameQueue,
+    VideoQueue,
+)
 from webmap.server.page_socket import (
     BROKEN_RULE,
     COME_BACK,
@@ -38,6 +49,7 @@ from webmap.server.page_socket import (
     FULL,
     SCENE,
     TOO_SOON,
+    VIDEO,
     Opens,
     OpenSockets,
     PageSocket,
@@ -149,6 +161,54 @@ class SceneSockets:
             )
         finally:
             handle.closed()
+
+
+MOST_VIDEOS = 8
+"""The greatest number of videos for each page that may be open, on average."""
+
+VIDEO_OVER = "this video has ended"
+
+
+class VideoSockets:
+    """The ``/_webmap/video/TAG`` sockets of one application."""
+
+    def __init__(self, calls: BatchedCallsByLoop, limit: int) -> None:
+        self._calls = calls
+        self._open = OpenSockets(MOST_VIDEOS * limit)
+
+    def end_unless(self, lasts: Callable[[str], object]) -> None:
+        """Close the sockets of the viewers whose session has ended."""
+        self._open.end_unless(lasts, SIGNED_OUT)
+
+    async def serve(self, socket: WebSocket) -> None:
+        """Serve one socket until it ends."""
+        viewer: Viewer = socket.scope[VIEWER]
+        stream = videos.get(socket.path_params["tag"])
+        await accept(socket)
+        if stream is None:
+            await close(socket, BROKEN_RULE, VIDEO_OVER)
+            return
+        queue = VideoQueue()
+        name = f"video for {viewer.operator.logged}"
+        page_socket = PageSocket(socket, name, self._calls.of_this_loop(), VIDEO, queue)
+
+        def answered(text: str) -> None:
+            queue.answer(text)
+            page_socket.go_on()
+
+        key = (viewer.id, secrets.token_hex(8))
+        async with self._open.holding(key, page_socket) as has_room:
+            if not has_room:
+                await page_socket.refuse(COME_BACK, "too many open videos")
+                return
+            end = partial(page_socket.end, BROKEN_RULE, VIDEO_OVER)
+            leave = stream.join(Viewing(page_socket.offer, end))
+            try:
+                await page_socket.run(
+                    answered, lambda why: log.warning("%s: %s", name, why)
+                )
+            finally:
+                leave.remove()
 
 
 ConnectToGate = Callable[

@@ -22,7 +22,7 @@ from webmap.ros.bridge import Bridge
 from webmap.ros.image_address import parse_address
 from webmap.ros.image_pull import Pull
 from webmap.ros.messages_image import AnyImageMsg, CompressedImageMsg, ImageMsg
-from webmap.ros.names import is_agent_url, split_type
+from webmap.ros.names import PICTURES, is_agent_url, split_type
 
 if TYPE_CHECKING:
     from webmap.core.robot import Robot
@@ -142,6 +142,49 @@ class CameraFeed:
         self.url = self.stamp = None
 
 
+class TopicCamera(CameraFeed):
+    """A camera that sends messages on a topic, while a page watches.
+
+    A derived class subscribes in ``subscribe``.
+
+    Args:
+        robot: The robot that carries the camera.
+        bridge: The bridge of the ROS system that has the topic.
+        topic: The topic.
+        name: The camera's name, for people.
+    """
+
+    def __init__(self, robot: "Robot", bridge: Bridge, topic: str, name: str) -> None:
+        super().__init__(robot, name)
+        self.topic = topic
+        self._bridge = bridge
+        self._scope: Scope | None = None
+
+    def subscribe(self) -> None:
+        """Subscribe to the topic; this ends with the current scope."""
+        raise NotImplementedError
+
+    def begin(self) -> None:
+        """Subscribe to the topic."""
+        self._scope = Scope(
+            f"camera {self.topic}", self._report, self.robot.clear_problem
+        )
+        with no_scope(), self._scope.active():
+            self.subscribe()
+
+    def end(self) -> None:
+        """Unsubscribe."""
+        scope, self._scope = self._scope, None
+        if scope is not None:
+            scope.close()
+
+    def _report(self, text: str, about: object) -> None:
+        if about is None:
+            self.robot.report_error(text)
+        else:
+            self.robot.set_problem(about, text)
+
+
 CameraType: TypeAlias = Literal[
     "sensor_msgs/CompressedImage",
     "sensor_msgs/Image",
@@ -150,7 +193,7 @@ CameraType: TypeAlias = Literal[
 ]
 """The types of pictures, in both dialects."""
 
-PACKED, RAW = "sensor_msgs/CompressedImage", "sensor_msgs/Image"
+PACKED, RAW = PICTURES
 
 JPEG = "jpeg"
 """The encoding of a large raw picture after the worker process has drawn it."""
@@ -193,7 +236,7 @@ PLAIN = re.compile(r"/image(?![^/]*(?:compress|jpe?g|png|webp))[^/]*\Z")
 
 
 @robot_modules.register
-class Camera(CameraFeed):
+class Camera(TopicCamera):
     """Receives the newest picture of a camera, for all pages that watch it.
 
     The robot sends pictures only while a page watches, and once for all pages. Pages
@@ -224,45 +267,30 @@ class Camera(CameraFeed):
         *,
         type: CameraType | None = None,
     ) -> None:
-        super().__init__(robot, name)
+        super().__init__(robot, bridge, topic, name)
         self.type = type_by_name(topic) if type is None else str(split_type(type))
         """The type, without a dialect; None if only the bridge knows it."""
         if self.type not in VIEWS:
             raise ConfigError(f"type is {PACKED} or {RAW}, got {type!r}")
-        self.topic = topic
-        self._bridge = bridge
         self._throttle = throttle
-        self._scope: Scope | None = None
         self._drawing: asyncio.Task[None] | None = None
         self._waiting: ImageMsg | None = None
 
-    def begin(self) -> None:
+    def subscribe(self) -> None:
         """Subscribe to the pictures."""
-        self._scope = Scope(
-            f"camera {self.topic}", self._report, self.robot.clear_problem
+        self._bridge.subscribe(
+            self.topic,
+            draw_or_report(self.robot, self.topic, self.on_picture),
+            self.type,
+            throttle=self._throttle,
+            decode=VIEWS[self.type],
+            encoding="binary",
         )
-        with no_scope(), self._scope.active():
-            self._bridge.subscribe(
-                self.topic,
-                draw_or_report(self.robot, self.topic, self.on_picture),
-                self.type,
-                throttle=self._throttle,
-                decode=VIEWS[self.type],
-                encoding="binary",
-            )
 
     def end(self) -> None:
         """Unsubscribe."""
-        scope, self._scope = self._scope, None
-        if scope is not None:
-            scope.close()
+        super().end()
         self._waiting = None
-
-    def _report(self, text: str, about: object) -> None:
-        if about is None:
-            self.robot.report_error(text)
-        else:
-            self.robot.set_problem(about, text)
 
     def on_picture(self, image: CompressedImageMsg | ImageMsg | AnyImageMsg) -> None:
         """Show a picture of either type.

@@ -1,4 +1,5 @@
 import { NewestPicture } from "./newest_picture.js";
+import { VideoPicture } from "./video_picture.js";
 import {
   html,
   setAttribute,
@@ -40,6 +41,8 @@ export class CameraCell {
     /** Whether the cell is in view: the others get no pictures. */
     this.seen = true;
     this.picture = new NewestPicture(loadImage, (image) => this._show(image));
+    /** @type {VideoPicture | null} Of a camera with video. */
+    this._video = null;
     const attributes = { type: "button", dir: "auto" };
     this._robot = html("button", "button quiet camera-robot", attributes);
     this._robot.addEventListener("click", () => acts.select(this.target.robot));
@@ -100,16 +103,44 @@ export class CameraCell {
   /** Remove the picture, and wait for a new one. */
   restart() {
     this.picture.restart();
-    this._frame.querySelector("img")?.remove();
+    this._video?.end();
+    this._video = null;
+    this._frame.querySelector(".camera-image")?.remove();
+  }
+
+  /**
+   * Show a video; a picture that is there stays until the first of the video.
+   *
+   * @param {string | null} address null ends the video.
+   * @param {() => number | null} clock The clock of the display in seconds, if known.
+   */
+  play(address, clock) {
+    if ((this._video?.address ?? null) === address) return;
+    this._video?.end();
+    this._video = null;
+    if (address === null) return;
+    const video = new VideoPicture(address, clock, (taken) => {
+      this.picture.shows(taken);
+      if (!video.canvas.isConnected) this._put(video.canvas);
+    });
+    this._video = video;
   }
 
   /** @param {HTMLImageElement} image */
   _show(image) {
-    const { name, label } = this.target;
-    image.alt = `Picture of ${name}: ${label}`;
-    image.className = "camera-image";
     image.draggable = false;
-    this._frame.querySelector("img")?.remove();
+    image.className = "camera-image";
+    this._put(image);
+  }
+
+  /** @param {HTMLElement} image */
+  _put(image) {
+    const { name, label } = this.target;
+    image.setAttribute(
+      image instanceof HTMLImageElement ? "alt" : "aria-label",
+      `Picture of ${name}: ${label}`,
+    );
+    this._frame.querySelector(".camera-image")?.remove();
     this._frame.prepend(image);
   }
 
@@ -138,6 +169,7 @@ export class CameraCell {
     else if (!shown && !old) words = "Waiting for a picture.";
     else if (!shown) words = "No picture yet.";
     else if (old) words = seconds < 60 ? "Frozen." : "Frozen for over a minute.";
+    if (there && this._video?.words) words = `${words} ${this._video.words}`.trim();
     if (old && mine) {
       words += " Commands are ignored: choose another camera or close this one.";
     }

@@ -11,6 +11,7 @@ import {
   roomFor,
   storeState,
 } from "./camera_view.js";
+import { CardVideos } from "./video_picture.js";
 import { resolve } from "../../web/access.js";
 import { devicesOf } from "../../web/inputs/devices.js";
 import { closeSheet } from "../../web/tools/elements.js";
@@ -26,7 +27,8 @@ import { closeSheet } from "../../web/tools/elements.js";
 /** @typedef {{op: 'cameras'} & RobotCameras} Cameras Of the selected robot. */
 /** @typedef {{op: 'robots', robots: RobotCameras[]}} Robots For the wall. */
 /** @typedef {{op: 'picture', camera: number, url: string, stamp: number}} Picture */
-/** @typedef {Cameras | Robots | Picture} Message */
+/** @typedef {{op: 'video', camera: number, url: string}} Video */
+/** @typedef {Cameras | Robots | Picture | Video} Message */
 
 /** Milliseconds between two updates of the age. */
 const PERIOD = 100;
@@ -70,6 +72,9 @@ class CameraPanel {
     /** What the display was asked for. */
     this._asked = "";
     this._goesBy = () => {};
+    /** @type {Map<number, string>} The addresses of the videos, by camera. */
+    this._videos = new Map();
+    this._cards = new CardVideos(() => map.clock);
     this._view = new CameraView({
       choose: (id) => this.choose(id),
       dock: (dock) => this._dock(dock),
@@ -85,7 +90,11 @@ class CameraPanel {
     });
     this._ending = new AbortController();
     const { signal } = this._ending;
-    document.addEventListener("visibilitychange", () => this._watch(), { signal });
+    const changed = () => {
+      this._watch();
+      this._look();
+    };
+    document.addEventListener("visibilitychange", changed, { signal });
     document.addEventListener("click", (event) => this._clicked(event), { signal });
     window.addEventListener("resize", () => this._place(), { signal });
     listenToFullScreen(map.drive, () => this._full, () => this._setFull(false), signal);
@@ -116,6 +125,7 @@ class CameraPanel {
     this._offEscape();
     clearInterval(this._timer);
     this._goesBy();
+    this._cards.destroy();
     this._view.destroy();
     delete document.body.dataset.camera;
     delete document.body.dataset.cameraWall;
@@ -125,7 +135,10 @@ class CameraPanel {
   receive(message) {
     if (message.op === "cameras") this._take(message);
     else if (message.op === "robots") this._takeAll(message.robots);
-    else {
+    else if (message.op === "video") {
+      this._videos.set(message.camera, message.url);
+      this._look();
+    } else {
       const { clock } = this._map;
       const age = clock === null ? 0 : 1000 * (clock - message.stamp);
       const url = resolve(message.url, document.baseURI);
@@ -350,6 +363,12 @@ class CameraPanel {
       if (button.getAttribute("aria-pressed") !== String(large)) {
         button.setAttribute("aria-pressed", String(large));
       }
+    }
+    this._cards.look();
+    const seen = document.visibilityState === "visible";
+    for (const cell of this._view.cells) {
+      const id = seen && cell.counts ? cell.target.camera?.id : undefined;
+      cell.play(this._videos.get(id ?? -1) ?? null, () => this._map.clock);
     }
     const { robots } = this._map.drive;
     this._view.look(this._there.robot, (robot) => robots.get(robot)?.mine === true);

@@ -53,8 +53,10 @@ class CameraPicture:
         self._image = html.img(alt=f"{camera.name} of {camera.robot.name}", hidden=True)
         self._age = html.span(class_="picture-age")
         self._age.set_age(math.inf, limit=AGE_LIMIT, age_text=True)
+        # camera_panel.js shows the video there.
+        self._video = html.span(class_="camera-video")
         button = html.button(
-            self._image,
+            self._video if hasattr(camera, "video") else self._image,
             html.span(
                 html.span(text=camera.name, class_="camera-title"),
                 self._age,
@@ -81,8 +83,10 @@ class CameraPicture:
         self._age.set_age(math.inf if stamp is None else time.monotonic() - stamp)
 
     def _show(self) -> None:
-        url = self.camera.url
-        if url is not None:
+        url, video = self.camera.url, video_of(self.camera)
+        if video is not None:
+            self._video.set("data-video", video)
+        elif url is not None:
             self._image.set(src=url, hidden=False)
             self._age.set_age(0.0)
 
@@ -177,7 +181,11 @@ class CameraPanel:
                 self._show(camera)
 
     def _show(self, camera: Any) -> None:
-        if camera.url is not None:
+        video = video_of(camera)
+        if video is not None:
+            number = camera_number(camera)
+            self.browser_part.send({"op": "video", "camera": number, "url": video})
+        elif camera.url is not None:
             self.browser_part.send(
                 {
                     "op": "picture",
@@ -207,6 +215,12 @@ def cameras_of(robot: "Robot | None") -> list[Any]:
 def is_camera(module: object) -> bool:
     """Return whether a module has the two names that a panel needs of a camera."""
     return hasattr(module, "watch") and hasattr(module, "url")
+
+
+def video_of(camera: Any) -> str | None:
+    """Return the URL of a camera's video; None if it has pictures."""
+    found: str | None = getattr(camera, "video", None)
+    return found
 
 
 def camera_number(camera: Any) -> int:

@@ -66,6 +66,7 @@ export class CameraView {
 
   destroy() {
     this._observer.disconnect();
+    for (const cell of this.cells) cell.restart();
     this.element.remove();
   }
 
@@ -124,6 +125,7 @@ export class CameraView {
   drop(cell) {
     this.cells = this.cells.filter((other) => other !== cell);
     this._observer.unobserve(cell.element);
+    cell.restart();
     cell.element.remove();
   }
 

@@ -60,6 +60,15 @@ export class NewestPicture {
     if (this._now() - this._busySince >= PATIENCE) this._begin();
   }
 
+  /**
+   * Note that a picture is shown that came in another way.
+   *
+   * @param {number} taken When it was taken.
+   */
+  shows(taken) {
+    this._taken = taken;
+  }
+
   _begin() {
     const next = this._next;
     if (next === null) return;

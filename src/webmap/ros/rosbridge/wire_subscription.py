@@ -13,7 +13,7 @@ from typing import Literal, NamedTuple
 
 from webmap.base.identifiers import generate_id
 from webmap.base.scope import no_scope
-from webmap.ros.names import is_type, split_type
+from webmap.ros.names import VIDEO, is_type, split_type
 from webmap.ros.rosbridge import ops
 from webmap.ros.rosbridge.events import Publish
 from webmap.ros.subscriptions import Topic
@@ -30,6 +30,7 @@ BULK = (
     "geometry_msgs/PoseArray",
     "visualization_msgs/Marker",
     "visualization_msgs/MarkerArray",
+    *VIDEO,
 )
 """Types that come in CBOR unless a listener asks for another encoding.
 

@@ -1,0 +1,423 @@
+"""The heads of video packets, by codec: where a decoder can start, and with what.
+
+No I/O, and no picture is decoded. A packet has one picture.
+"""
+
+from typing import NamedTuple, Protocol
+
+from webmap.base.errors import ProtocolError
+
+MOST_UNITS = 512
+"""Most units of a packet."""
+
+START = b"\0\0\1"
+
+
+class Bits:
+    """Reads numbers of any length from bytes, the highest bit first.
+
+    Args:
+        data: The bytes; keep them few, because they are one large number.
+    """
+
+    def __init__(self, data: bytes) -> None:
+        self._value = int.from_bytes(data, "big")
+        self._left = 8 * len(data)
+
+    def take(self, count: int) -> int:
+        """Return the number in the next ``count`` bits.
+
+        Raises:
+            ProtocolError: If there are fewer.
+        """
+        self._left -= count
+        if self._left < 0:
+            raise ProtocolError("a video packet that ends too early")
+        return self._value >> self._left & (1 << count) - 1
+
+    def golomb(self) -> int:
+        """Return the next number in the code ``ue(v)`` of H.264.
+
+        Raises:
+            ProtocolError: If it has more than 32 bits, or the data ends before.
+        """
+        zeros = 0
+        while not self.take(1):
+            zeros += 1
+            if zeros > 32:
+                raise ProtocolError("a video packet with a number of more than 32 bits")
+        return (1 << zeros) - 1 + self.take(zeros)
+
+
+def nal_units(data: bytes) -> list[tuple[int, int]]:
+    """Return begin and end of each NAL unit of a packet in Annex B form.
+
+    Raises:
+        ProtocolError: If the packet does not begin with a start code, has too many
+            units, or an empty one.
+    """
+    begin = data.find(START)
+    if begin < 0 or data[:begin].strip(b"\0"):
+        raise ProtocolError(
+            "a video packet that does not begin with a start code: the encoder must "
+            "write Annex B"
+        )
+    units: list[tuple[int, int]] = []
+    for _ in range(MOST_UNITS):
+        begin += len(START)
+        following = data.find(START, begin)
+        end = len(data) if following < 0 else following
+        if end == begin:
+            raise ProtocolError("a video packet with an empty NAL unit")
+        units.append((begin, end))
+        if following < 0:
+            return units
+        begin = following
+    raise ProtocolError(f"a video packet with more than {MOST_UNITS} NAL units")
+
+
+def unescaped(unit: bytes) -> bytes:
+    """Return a NAL unit without the bytes that prevent start codes in it."""
+    return unit.replace(b"\0\0\3", b"\0\0")
+
+
+class VideoConfig(NamedTuple):
+    """What a decoder needs before a key picture."""
+
+    codec: str
+    """As in RFC 6381, for the browser."""
+
+    width: int
+    """In pixels, before cropping."""
+
+    height: int
+
+
+class Picture(NamedTuple):
+    """The head of a packet that has a picture."""
+
+    data: bytes
+    """The packet; a key picture with its parameters."""
+
+    config: VideoConfig | None
+    """Of a key picture, None of all others."""
+
+    follows: bool = True
+    """Whether the picture before it came, as far as the codec shows that."""
+
+    is_late: bool = False
+    """Whether it refers to a later picture."""
+
+
+class Codec(Protocol):
+    """Reads the packets of one video in their order."""
+
+    def read(self, data: bytes) -> Picture | None:
+        """Return the picture in a packet; None if it has parameters only.
+
+        Raises:
+            ProtocolError: If the packet is not valid.
+        """
+
+
+class Sps(NamedTuple):
+    """The parts of a sequence parameter set of H.264 that are used."""
+
+    config: VideoConfig
+    frame_bits: int
+    """Bits of ``frame_num``, which counts the pictures that others refer to."""
+
+    has_gaps: bool
+    """Whether the encoder may leave out numbers."""
+
+    has_planes: bool
+    """Whether the planes of colours are coded separately."""
+
+
+WITH_CHROMA = {44, 83, 86, 100, 110, 118, 122, 128, 134, 135, 138, 139, 244}
+"""The profiles whose parameters describe the colours."""
+
+MOST_READ = 512
+"""Most bytes of a parameter set that are read: each read takes time for all of them."""
+
+MOST_PARAMETERS = 16 << 10
+"""Most bytes of the parameters of a video that are kept."""
+
+TOO_LONG = f"a video with more than {MOST_PARAMETERS} bytes of parameters (SPS and PPS)"
+
+
+def read_sps(unit: bytes) -> Sps:
+    """Return what a sequence parameter set of H.264 states.
+
+    Raises:
+        ProtocolError: If it is not valid.
+    """
+    profile, constraints, level = unit[1:4].ljust(3, b"\0")
+    bits = Bits(unescaped(unit[4 : 4 + MOST_READ]))
+    bits.golomb()
+    has_planes = 0
+    if profile in WITH_CHROMA:
+        chroma = bits.golomb()
+        has_planes = bits.take(1) if chroma == 3 else 0
+        bits.golomb()
+        bits.golomb()
+        bits.take(1)
+        if bits.take(1):
+            for number in range(12 if chroma == 3 else 8):
+                if bits.take(1):
+                    _skip_scaling(bits, 16 if number < 6 else 64)
+    frame_bits = 4 + bits.golomb()
+    order = bits.golomb()
+    if order == 0:
+        bits.golomb()
+    elif order == 1:
+        bits.take(1)
+        for _ in range(2):
+            bits.golomb()
+        for _ in range(bits.golomb()):
+            bits.golomb()
+    bits.golomb()
+    has_gaps = bits.take(1)
+    width, rows = 16 * (1 + bits.golomb()), 16 * (1 + bits.golomb())
+    height = rows * (2 - bits.take(1))
+    if frame_bits > 16:
+        raise ProtocolError("a video whose parameters (SPS) are not valid")
+    codec = f"avc1.{profile:02x}{constraints:02x}{level:02x}"
+    config = VideoConfig(codec, width, height)
+    return Sps(config, frame_bits, bool(has_gaps), bool(has_planes))
+
+
+def _skip_scaling(bits: Bits, size: int) -> None:
+    scale = 8
+    for _ in range(size):
+        code = bits.golomb()
+        scale = (scale + ((code + 1) // 2 if code % 2 else -(code // 2))) % 256
+        if scale == 0:
+            return
+
+
+class H264:
+    """Reads H.264 in Annex B form, and keeps the newest parameters."""
+
+    def __init__(self) -> None:
+        self._sps: dict[int, tuple[bytes, Sps]] = {}
+        self._pps: dict[int, tuple[bytes, int]] = {}
+        self._last = 0
+        """The number of the last picture that others refer to."""
+
+    def read(self, data: bytes) -> Picture | None:
+        """Return the picture in a packet; None if it has parameters only.
+
+        Raises:
+            ProtocolError: If the packet is not valid.
+        """
+        own: set[tuple[int, int]] = set()
+        first: bytes | None = None
+        for begin, end in nal_units(data):
+            type = data[begin] & 31
+            if type in (7, 8):
+                own.add((type, self._keep(type, data[begin:end])))
+            elif type in (1, 5) and first is None:
+                first = data[begin : min(end, begin + 40)]
+            elif type == 2:
+                raise ProtocolError("a video of H.264 with data partitions")
+        return None if first is None else self._picture(data, first, own)
+
+    def _keep(self, type: int, unit: bytes) -> int:
+        if type == 7:
+            number = Bits(unescaped(unit[4:20])).golomb()
+            self._sps[number] = unit, read_sps(unit)
+        else:
+            bits = Bits(unescaped(unit[1:20]))
+            number = bits.golomb()
+            self._pps[number] = unit, bits.golomb()
+        kept = (*self._sps.values(), *self._pps.values())
+        if sum(len(unit) for unit, _ in kept) > MOST_PARAMETERS:
+            self._sps.clear()
+            self._pps.clear()
+            raise ProtocolError(TOO_LONG)
+        return number
+
+    def _picture(self, data: bytes, slice: bytes, own: set[tuple[int, int]]) -> Picture:
+        is_key = slice[0] & 31 == 5
+        bits = Bits(unescaped(slice[1:]))
+        first, kind, pps = bits.golomb(), bits.golomb(), bits.golomb()
+        if first:
+            raise ProtocolError(
+                "a video packet with a part of a picture: each message must have one "
+                "whole picture"
+            )
+        _, sps = self._sps.get(self._pps.get(pps, (b"", -1))[1], (b"", None))
+        if sps is None:
+            if not is_key:
+                return Picture(data, None)
+            raise ProtocolError(
+                "a key picture (IDR) of H.264 without SPS and PPS: let the encoder "
+                "repeat them in front of each key picture"
+            )
+        bits.take(2 if sps.has_planes else 0)
+        number = bits.take(sps.frame_bits)
+        follows = sps.has_gaps or (number - self._last) % (1 << sps.frame_bits) <= 1
+        if is_key or slice[0] & 96:  # others refer to it
+            self._last = 0 if is_key else number
+        if not is_key:
+            return Picture(data, None, follows, is_late=kind % 5 == 1)
+        missing = [
+            START + unit
+            for type, kept in ((7, self._sps), (8, self._pps))
+            for id, (unit, _) in kept.items()
+            if (type, id) not in own
+        ]
+        return Picture(b"".join((*missing, data)), sps.config)
+
+
+class H265:
+    """Reads H.265 in Annex B form; a lost message is not noticed."""
+
+    def __init__(self) -> None:
+        self._parameters: dict[int, bytes] = {}
+        self._config: VideoConfig | None = None
+
+    def read(self, data: bytes) -> Picture | None:
+        """Return the picture in a packet; None if it has parameters only.
+
+        Raises:
+            ProtocolError: If the packet is not valid.
+        """
+        own, kind = set(), None
+        for begin, end in nal_units(data):
+            type = data[begin] >> 1 & 63
+            if type in (32, 33, 34):  # VPS, SPS, PPS
+                own.add(type)
+                if end - begin > MOST_PARAMETERS:
+                    raise ProtocolError(TOO_LONG)
+                self._parameters[type] = START + data[begin:end]
+                if type == 33:
+                    self._config = _h265_config(unescaped(data[begin:end]))
+            elif type < 32 and kind is None:
+                kind = type
+        if kind is None:
+            return None
+        if not 16 <= kind <= 21:  # not a random access point
+            return Picture(data, None)
+        if self._config is None or len(self._parameters) < 3:
+            raise ProtocolError(
+                "a key picture of H.265 without VPS, SPS and PPS: let the encoder "
+                "repeat them in front of each key picture"
+            )
+        missing = [self._parameters[type] for type in (32, 33, 34) if type not in own]
+        return Picture(b"".join((*missing, data)), self._config)
+
+
+def _h265_config(sps: bytes) -> VideoConfig:
+    bits = Bits(sps[2:MOST_READ])
+    bits.take(4)
+    layers = bits.take(3)
+    bits.take(1)
+    space, tier, profile = bits.take(2), bits.take(1), bits.take(5)
+    compatible = int(f"{bits.take(32):032b}"[::-1], 2)
+    constraints = bits.take(48).to_bytes(6, "big").rstrip(b"\0")
+    level = bits.take(8)
+    there = [(bits.take(1), bits.take(1)) for _ in range(layers)]
+    bits.take(2 * (8 - layers) if layers else 0)
+    for has_profile, has_level in there:
+        bits.take(88 * has_profile + 8 * has_level)
+    bits.golomb()
+    if bits.golomb() == 3:
+        bits.take(1)
+    parts = [
+        "hev1",
+        " ABC"[space].strip() + str(profile),
+        f"{compatible:x}",
+        f"{'LH'[tier]}{level}",
+        *(f"{each:x}" for each in constraints),
+    ]
+    return VideoConfig(".".join(parts), bits.golomb(), bits.golomb())
+
+
+class Vp9:
+    """Reads VP9, one picture in each packet; a lost message is not noticed."""
+
+    def read(self, data: bytes) -> Picture | None:
+        """Return the picture in a packet.
+
+        Raises:
+            ProtocolError: If the packet is not valid.
+        """
+        bits = Bits(data[:32])
+        if bits.take(2) != 2:
+            raise ProtocolError("a video packet that is not VP9")
+        profile = bits.take(1) + 2 * bits.take(1)
+        if profile == 3:
+            bits.take(1)
+        if bits.take(1) or bits.take(1):  # shows an earlier picture, or refers to one
+            return Picture(data, None)
+        bits.take(2)
+        if bits.take(24) != 0x498342:
+            raise ProtocolError("a key picture that is not VP9")
+        depth = 8 if profile < 2 else 12 if bits.take(1) else 10
+        if bits.take(3) != 7:  # not RGB
+            bits.take(1 if profile in (0, 2) else 4)
+        elif profile in (1, 3):
+            bits.take(1)
+        width, height = 1 + bits.take(16), 1 + bits.take(16)
+        return Picture(
+            data, VideoConfig(f"vp09.{profile:02}.51.{depth:02}", width, height)
+        )
+
+
+class Av1:
+    """Reads AV1, one picture in each packet; a lost message is not noticed."""
+
+    def read(self, data: bytes) -> Picture | None:
+        """Return the picture in a packet.
+
+        Raises:
+            ProtocolError: If the packet is not valid.
+        """
+        at, config = 0, None
+        for _ in range(MOST_UNITS):
+            if at >= len(data):
+                break
+            bits = Bits(data[at : at + 10])
+            wrong, type = bits.take(1), bits.take(4)
+            more, has_size, _ = bits.take(1), bits.take(1), bits.take(1)
+            if wrong or not has_size:
+                raise ProtocolError(
+                    "a video packet that is not AV1 in its low overhead format"
+                )
+            at += 1 + more
+            bits.take(8 * more)
+            size = shift = 0
+            while (byte := bits.take(8)) & 128:
+                size, shift, at = size | (byte & 127) << shift, shift + 7, at + 1
+            size, at = size | byte << shift, at + 1
+            if type == 1:
+                config = _av1_config(Bits(data[at : at + min(size, 64)]))
+            at += size
+        if at != len(data) or not data:
+            raise ProtocolError("a video packet of AV1 that is not complete")
+        return Picture(data, config)
+
+
+def _av1_config(bits: Bits) -> VideoConfig:
+    profile, _, reduced = bits.take(3), bits.take(1), bits.take(1)
+    tier = 0
+    if reduced:
+        level = bits.take(5)
+    else:
+        if bits.take(1):
+            raise ProtocolError("a video of AV1 with timing information")
+        delays, points = bits.take(1), 1 + bits.take(5)
+        for number in range(points):
+            bits.take(12)
+            this_level = bits.take(5)
+            this_tier = bits.take(1) if this_level > 7 else 0
+            if delays and bits.take(1):
+                bits.take(4)
+            if number == 0:
+                level, tier = this_level, this_tier
+    wide, high = 1 + bits.take(4), 1 + bits.take(4)
+    width, height = 1 + bits.take(wide), 1 + bits.take(high)
+    codec = f"av01.{profile}.{level:02}{'MH'[tier]}.08"
+    return VideoConfig(codec, width, height)
