@@ -78,6 +78,7 @@ class Decisions:
         line = f"{now:.6f} {event!r} {text_of(actions)}"
         # What most robots do not have is not part of the record.
         line = re.sub(r", check(ed|_every)?=None", "", line)
+        line = re.sub(r", (only_echoes|drive_without_proof)=False", "", line)
         if "WebMap-" in line:
             line = re.sub(r"WebMap-\w+-\d+", lambda match: self._number(match[0]), line)
         self.count += 1
