@@ -12,6 +12,7 @@ import foxglove
 from foxglove.websocket import Capability, ServerListener
 from websockets.asyncio.server import serve
 from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
 
 TYPES = {
     "/cmd_vel": "geometry_msgs/msg/Twist",
@@ -92,7 +93,9 @@ class FoxgloveRobot:
 
 
 class SdkRobot(FoxgloveRobot):
-    """A robot behind the server of foxglove_bridge 3: a thread for each client."""
+    """A robot behind the server of foxglove_bridge 3, with few threads for all."""
+
+    subprotocol = "foxglove.sdk.v1"
 
     def start(self):
         self._context = foxglove.Context()
@@ -250,13 +253,14 @@ class OldRobot(FoxgloveRobot):
 
 
 class OtherClient:
-    """Another client of the bridge, which makes it wait."""
+    """Another client of the bridge, which makes it wait; used as a context manager."""
 
-    def __init__(self, robot, subprotocol):
-        from websockets.sync.client import connect
-
+    def __init__(self, robot):
         url = robot.url.replace("foxglove", "ws")
-        self._socket = connect(url, subprotocols=[subprotocol], compression=None)
+        self._connect = connect(url, subprotocols=[robot.subprotocol], compression=None)
+
+    def __enter__(self):
+        self._socket = self._connect.__enter__()
         channel = {
             "id": 1,
             "topic": STALL,
@@ -264,13 +268,19 @@ class OtherClient:
             "schemaName": "std_msgs/msg/UInt32",
         }
         self._socket.send(json.dumps({"op": "advertise", "channels": [channel]}))
-        self._reading = threading.Thread(target=lambda: list(self._socket))
+        self._reading = threading.Thread(target=self._read)
         self._reading.start()
+        return self
+
+    def __exit__(self, *exception):
+        self._connect.__exit__(*exception)
+        self._reading.join(5)
+
+    def _read(self):
+        with contextlib.suppress(ConnectionClosed):
+            for _ in self._socket:
+                pass
 
     def stall(self, seconds):
         milliseconds = int(1000 * seconds)
         self._socket.send(struct.pack("<BI4sI", 1, 1, b"\0\1\0\0", milliseconds))
-
-    def close(self):
-        self._socket.close()
-        self._reading.join(5)
