@@ -26,8 +26,9 @@ from webmap.cli.options import (
 def discover(
     url: tuple[str, ...], toml: bool, wait: float, topics: dict[str, str] | None
 ) -> None:
-    """List the robots behind rosbridges, their topics, and the rule for each topic.
+    """List the robots behind bridges, their topics, and the rule for each topic.
 
+    URL is the address of a rosbridge, or of a Foxglove bridge: foxglove://robot:8765.
     The address of a router is that of all its agents: zenoh://host:7447. Nothing is
     moved or changed. The exit code is 1 if no robot is found.
 

@@ -74,8 +74,9 @@ def doctor(
     stop_test: str | None,
     yes: bool,
 ) -> None:
-    """Diagnose a rosbridge and the robots behind it, and suggest what to do.
+    """Diagnose a bridge and the robots behind it, and suggest what to do.
 
+    URL is the address of a rosbridge, or of a Foxglove bridge: foxglove://robot:8765.
     The address of an agent is that of its rosbridge: zenoh://host:7447/bay3; that of a
     router is that of all its agents.
 

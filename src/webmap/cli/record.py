@@ -55,9 +55,10 @@ def record(
     wait: float,
     topics: dict[str, str] | None,
 ) -> None:
-    """Record the topics behind a rosbridge into a bag.
+    """Record the topics behind a bridge into a bag.
 
-    URL is the address of a rosbridge, or of an agent: zenoh://host:7447/bay3.
+    URL is the address of a rosbridge, of a Foxglove bridge: foxglove://robot:8765, or
+    of an agent: zenoh://host:7447/bay3.
 
     The bag has the format of the robot's ROS: a .bag file, or a folder with an MCAP
     file. Topics that appear later are recorded too. Nothing is moved. This command

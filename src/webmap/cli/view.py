@@ -97,16 +97,17 @@ def view(
     no_incidents: bool,
     web: dict[str, Any],
 ) -> None:
-    """See and drive the robots behind one rosbridge or several.
+    """See and drive the robots behind one bridge or several.
 
-    URL is the address of a rosbridge: ws://robot:9090, or of a router with agents:
-    zenoh://host:7447, or of one of them: zenoh://host:7447/bay3. The robots behind a
-    rosbridge are found by their topics, also those that appear later; --show lists the
-    topics in use. Correct a wrong guess with --set, or list a robot's topics with
-    --robot.
+    URL is the address of a rosbridge: ws://robot:9090, of a Foxglove bridge:
+    foxglove://robot:8765, of a router with agents: zenoh://host:7447, or of one of
+    them: zenoh://host:7447/bay3. The robots behind a bridge are found by their topics,
+    also those that appear later; --show lists the topics in use. Correct a wrong guess
+    with --set, or list a robot's topics with --robot.
 
     \b
     webmap view ws://robot:9090
+    webmap view foxglove://robot:8765
     webmap view ws://robot:9090 --set robot_1.scan=/robot_1/front/scan
     webmap view ws://robot:9090 --robot Bob:/odom:/cmd_vel:/scan
     """

@@ -43,7 +43,8 @@ from webmap.fleet.robot_files import (
     config_for_displays,
 )
 from webmap.poses.alignment import alignments
-from webmap.ros.names import is_type, normalise_topic
+from webmap.ros.foxglove.as_rosbridge import RosbridgeOfFoxglove
+from webmap.ros.names import is_foxglove_url, is_type, normalise_topic
 from webmap.ros.rosbridge.calls import Calls
 from webmap.ros.rosbridge.events import Publish
 from webmap.ros.rosbridge.graph import BridgeGraph
@@ -132,7 +133,10 @@ class Agent:
         self._beams = dict(beams or {})
         self._whole: set[str] = set()
         """The topics whose messages could not be read as scans."""
-        self._lane = BridgeConnection(
+        self._lane_type = BridgeConnection
+        if is_foxglove_url(url):
+            self._lane_type = RosbridgeOfFoxglove
+        self._lane = self._lane_type(
             url,
             opened=self._bridge_opened,
             received=self._received,
@@ -340,7 +344,7 @@ class Agent:
         if len(self._calls) > MOST_USERS and user not in self._calls:
             user = ""  # a router without users has any number of names
         if user not in self._calls:
-            self._calls[user] = Calls(self.url)
+            self._calls[user] = Calls(self.url, self._lane_type)
         return self._calls[user]
 
     def _call(self, call: Call) -> None:

@@ -17,6 +17,7 @@ from webmap.fleet.overrides import Overrides
 from webmap.fleet.robot_files import check_agent_fleet, load_pictures
 from webmap.fleet.robot_options import parse_robots
 from webmap.fleet.search import find_fleet
+from webmap.ros.names import web_socket_url
 from webmap.ros.rosbridge.checks import is_loopback, listening_addresses
 from webmap.ros.tf import Buffer
 
@@ -138,7 +139,8 @@ def open_addresses(url: str) -> list[str] | None:
     parts = urlsplit(url)
     if not is_loopback(parts.hostname or ""):
         return [parts.hostname or ""]
-    listens = listening_addresses(parts.port or 80)
+    port = urlsplit(web_socket_url(url)).port or 80
+    listens = listening_addresses(port)
     if not listens:
         return None
     return [each for each in listens if not is_loopback(each)]

@@ -1,7 +1,7 @@
 """The connection to one ROS system, shared by the whole process.
 
 A :class:`Bridge` has topics, messages and services, and refuses messages that only the
-gate may publish. The wire protocol is in ``rosbridge``.
+gate may publish. The wire protocols are in ``rosbridge`` and ``foxglove``.
 """
 
 import asyncio
@@ -55,7 +55,7 @@ def _link_type(url: str) -> LinkType:
 
 
 class Bridge:
-    """A connection to one ROS system through a rosbridge v2 server.
+    """A connection to one ROS system through a rosbridge or a Foxglove bridge.
 
     Creating a bridge opens no connection. The connection opens when WebMap starts, and
     reopens after each loss with all subscriptions and advertisements. Call the methods
@@ -66,7 +66,8 @@ class Bridge:
     outside of the page function.
 
     Args:
-        url: Address of the rosbridge, such as ``ws://localhost:9090``.
+        url: Address of a rosbridge, such as ``ws://localhost:9090``, or of a Foxglove
+            bridge, such as ``foxglove://localhost:8765``.
         name: Name shown to people; the address if not given.
 
     Raises:

@@ -153,7 +153,7 @@ def normalise_url(url: str) -> str:
         ConfigError: If the text is not the address of a bridge.
 
     """
-    hint = "expected one such as 'ws://localhost:9090' or 'wss://robot.example/ros'"
+    hint = "expected one such as 'ws://localhost:9090' or 'foxglove://robot:8765'"
     if not isinstance(url, str) or any(c.isspace() or c < " " for c in url.strip()):
         raise ConfigError(f"{url!r} is not the address of a bridge: {hint}")
     try:

@@ -19,9 +19,6 @@ class ReceivedMessage:
 
     __slots__ = ("_decoded", "frame", "size", "topic")
 
-    arguments: tuple[str | None, ...] = ()
-    """What the constructor needs after the topic and the bytes, in another process."""
-
     def __init__(self, topic: str, frame: bytes | bytearray) -> None:
         self.topic = topic
         self.frame = frame
@@ -64,6 +61,11 @@ class ReceivedMessage:
     def forget(self, type: type[msgspec.Struct] | None) -> None:
         """Forget the stored value; the next :meth:`decode` decodes again."""
         self._decoded.pop(type, None)
+
+    @property
+    def arguments(self) -> tuple[str | None, ...]:
+        """What the constructor needs after the topic and the bytes elsewhere."""
+        return ()
 
     @property
     def is_binary(self) -> bool:

@@ -28,7 +28,8 @@ from webmap.discovery.findings import Findings, FoundRobot
 from webmap.discovery.frames import FrameCollector, frame_topics
 from webmap.discovery.robots import discover, host_name
 from webmap.ros.bridge import Bridge
-from webmap.ros.names import is_agent_url, is_type
+from webmap.ros.foxglove.protocol import SUBPROTOCOLS
+from webmap.ros.names import is_agent_url, is_foxglove_url, is_type, web_socket_url
 from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.rosbridge import checks
 from webmap.ros.subscriptions import Encoding
@@ -122,7 +123,7 @@ async def observe(
             if not unlisted:
                 progress("Requesting the time, the publishers and the subscribers.")
                 seen = await _ask(seen, bridge)
-                if ask_parameters:
+                if ask_parameters and not is_foxglove_url(url):
                     link = await checks.asked_about_threads(
                         seen.link, bridge.call_service
                     )
@@ -140,9 +141,10 @@ async def observe(
 
 
 async def _look(url: str) -> dict[str, Any]:
-    """Return what is seen of the rosbridge itself, or known by its agent."""
+    """Return what is seen of the bridge itself, or known by its agent."""
     if not is_agent_url(url):
-        return {"link": await checks.look(url)}
+        offered = SUBPROTOCOLS if is_foxglove_url(url) else ()
+        return {"link": await checks.look(web_socket_url(url), offered)}
     about = await asyncio.to_thread(about_agent, url)
     if about is None or about.open_at is None:
         return {}
@@ -153,6 +155,9 @@ async def tried(seen: BridgeFacts) -> BridgeFacts:
     """Return the observations, with a test of what a slow service call delays."""
     if is_agent_url(seen.url):
         why = "an agent lets a display offer no service"
+        return replace(seen, link=checks.not_tried(seen.link, why))
+    if is_foxglove_url(seen.url):
+        why = "clients of a Foxglove bridge can offer no service"
         return replace(seen, link=checks.not_tried(seen.link, why))
     if seen.unlisted:
         return replace(seen, link=checks.not_tried(seen.link))
@@ -211,6 +216,8 @@ class _Questions:
             began, wall = time.monotonic(), time.time()
             theirs = await self.ask(bridge.time)
             trip = time.monotonic() - began
+            if is_foxglove_url(bridge.url):  # its messages have its time: no question
+                trip = bridge.lag
             if theirs is None:
                 break
             found.append(Clock(theirs - (wall + trip / 2), trip))

@@ -7,7 +7,8 @@ from urllib.parse import urlsplit
 from webmap.base.text import one_line
 from webmap.discovery.doctor.facts import MOST_ROBOTS, BridgeFacts, Clock
 from webmap.discovery.doctor.robot_rules import robot_findings
-from webmap.ros.names import agent_named, is_agent_url
+from webmap.ros.foxglove import advice as foxglove_advice
+from webmap.ros.names import agent_named, is_agent_url, is_foxglove_url
 from webmap.ros.rosbridge import advice
 from webmap.ros.rosbridge.advice import BRIDGE, LEVELS, Finding, Level, listen_advice
 from webmap.ros.rosbridge.checks import is_loopback
@@ -75,14 +76,15 @@ GIVE_TOPICS = (
 def _bridge(seen: BridgeFacts) -> Iterator[Finding]:
     """Yield the findings about the connection and everything behind it."""
     by_agent = is_agent_url(seen.url)
+    by_foxglove = is_foxglove_url(seen.url)
     if seen.trouble:
-        yield (
-            _unreachable_agent(seen) if by_agent else advice.unreachable(seen.trouble)
-        )
+        yield _unreachable(seen)
         return
     dialect = seen.findings.dialect
     if by_agent:
         yield from _agent(seen)
+    elif by_foxglove:
+        yield from foxglove_advice.findings(seen.link, seen.url)
     else:
         yield advice.openness(seen.link, seen.url, seen.shown, dialect)
     if seen.unlisted:
@@ -92,13 +94,21 @@ def _bridge(seen: BridgeFacts) -> Iterator[Finding]:
     if seen.topics_given or not seen.unlisted:
         yield from _robots(seen)
     if seen.clock is not None:
-        yield from _clock(seen.clock)
+        yield from _clock(seen.clock, "A ping" if by_foxglove else "A service call")
     elif not seen.unlisted:
         text = "The bridge does not report its time, so clocks are not compared."
         yield Finding("note", BRIDGE, text)
-    if not by_agent:
+    if not by_agent and not by_foxglove:
         yield advice.blocking(seen.link, seen.url, dialect)
         yield advice.compression(seen.link, _packed_scans(seen))
+
+
+def _unreachable(seen: BridgeFacts) -> Finding:
+    if is_agent_url(seen.url):
+        return _unreachable_agent(seen)
+    if is_foxglove_url(seen.url):
+        return foxglove_advice.unreachable(seen.trouble)
+    return advice.unreachable(seen.trouble)
 
 
 def _packed_scans(seen: BridgeFacts) -> list[str]:
@@ -135,8 +145,8 @@ def _robots(seen: BridgeFacts) -> Iterator[Finding]:
         )
 
 
-def _clock(clock: Clock) -> Iterator[Finding]:
-    trip = f"A service call takes {clock.round_trip * 1000:.0f} ms"
+def _clock(clock: Clock, asked: str) -> Iterator[Finding]:
+    trip = f"{asked} takes {clock.round_trip * 1000:.0f} ms"
     near = "Use a faster connection, such as a cable or a better radio link."
     if clock.round_trip > NO_LOOP:
         yield Finding("wrong", BRIDGE, f"{trip}: too long for driving.", near)

@@ -103,10 +103,10 @@ class Calls:
             request = format_of_part(
                 service.request, f"{service.type}_Request", encodings
             )
+            data = request.write(args)
             response = format_of_part(
                 service.response, f"{service.type}_Response", encodings
             )
-            data = request.write(args)
         except ConfigError as error:
             raise ServiceError(f"{name} cannot be called: {error}") from None
         try:

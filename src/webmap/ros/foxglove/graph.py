@@ -11,8 +11,7 @@ from webmap.ros.definitions import Definitions
 from webmap.ros.foxglove.calls import Calls
 from webmap.ros.foxglove.messages import (
     Format,
-    arguments_of,
-    format_of,
+    format_of_channel,
     format_of_part,
 )
 from webmap.ros.foxglove.protocol import Parameter
@@ -106,7 +105,7 @@ class FoxgloveGraph:
         def look() -> Format | None:
             if kind == "msg":
                 channel = session.channel_with(type)
-                return None if channel is None else format_of(*arguments_of(channel))
+                return None if channel is None else format_of_channel(channel)
             encodings = (session.info and session.info.supported_encodings) or []
             for service in session.services.values():
                 if same_type(service.type, type) and service.request is not None:
@@ -123,11 +122,14 @@ class FoxgloveGraph:
         raise ServiceError(why)
 
     async def time(self) -> float | None:
-        """Return the time of the ROS system in seconds; None until a message came."""
+        """Return the time of the ROS system in seconds; None until a message came.
+
+        Each message has the time of the server; half of a ping is added for its way.
+        """
         if self._main.time is None:
             return None
         stamp, came = self._main.time
-        return stamp / 1e9 + time.monotonic() - came
+        return stamp / 1e9 + time.monotonic() - came + self._main.connection.lag / 2
 
     async def set_parameter(self, name: str, value: Any, patience: float) -> Any:
         """Set a parameter and return its new value.

@@ -40,13 +40,16 @@ class Format:
     def __init__(
         self, type: str, encoding: str, schema_encoding: str | None, text: str | None
     ) -> None:
+        self.arguments = (type, encoding, schema_encoding, text)
         self.type = type
         self.encoding = encoding
         self._schema_encoding = schema_encoding or _SCHEMAS.get(encoding, "")
         self._text = text
-        self._readers: dict[Any, Callable[[bytes], Any] | str] = {}
+        self._readers: dict[Any, Callable[[bytes | bytearray], Any] | str] = {}
 
-    def read(self, data: bytes, wanted: type[msgspec.Struct] | None = None) -> Any:
+    def read(
+        self, data: bytes | bytearray, wanted: type[msgspec.Struct] | None = None
+    ) -> Any:
         """Return a message as ``wanted``, or as a plain dict.
 
         Raises:
@@ -96,7 +99,7 @@ class Format:
 
     def _make_reader(
         self, wanted: type[msgspec.Struct] | None
-    ) -> Callable[[bytes], Any] | str:
+    ) -> Callable[[bytes | bytearray], Any] | str:
         if self.encoding == "json":
             return lambda data: _read_json(data, wanted)
         try:
@@ -105,7 +108,7 @@ class Format:
             return f"the bridge's schema of {self.type} cannot be used: {error}"
 
 
-def _read_json(data: bytes, wanted: type[msgspec.Struct] | None) -> Any:
+def _read_json(data: bytes | bytearray, wanted: type[msgspec.Struct] | None) -> Any:
     value = decode_json(data, wanted or dict[str, Any])
     if wanted is None:
         check_depth(value)
@@ -133,11 +136,13 @@ def _is_type(name: str) -> bool:
     return True
 
 
-def arguments_of(channel: Channel) -> tuple[str, str, str | None, str | None]:
-    """Return what makes the :class:`Format` of a channel, and its messages."""
+def format_of_channel(channel: Channel) -> Format:
+    """Return the format of the messages of a channel."""
     # A bridge without a definition of a type offers the channel without a schema.
     text = channel.schema or None
-    return (channel.schema_name, channel.encoding, channel.schema_encoding, text)
+    return format_of(
+        channel.schema_name, channel.encoding, channel.schema_encoding, text
+    )
 
 
 def format_of_part(
@@ -213,27 +218,27 @@ class FoxgloveMessage(ReceivedMessage):
     Args:
         topic: The topic.
         frame: The frame of message data.
-        type: The type, as in the channel.
-        encoding: The encoding of the message.
-        schema_encoding: The language of the schema.
-        text: The schema.
+        arguments: Those of the message's format, if that is not given.
+        format: The format.
 
     """
 
-    __slots__ = ("arguments", "format")
+    __slots__ = ("format",)
 
     def __init__(
         self,
         topic: str,
         frame: bytes | bytearray,
-        type: str = "",
-        encoding: str = "json",
-        schema_encoding: str | None = None,
-        text: str | None = None,
+        *arguments: Any,
+        format: Format | None = None,
     ) -> None:
         super().__init__(topic, frame)
-        self.format = format_of(type, encoding, schema_encoding, text)
-        self.arguments = (type, encoding, schema_encoding, text)
+        self.format = format or format_of(*arguments)
+
+    @property
+    def arguments(self) -> tuple[str | None, ...]:
+        """What makes the format of the message in another process."""
+        return self.format.arguments
 
     @property
     def is_binary(self) -> bool:
@@ -241,9 +246,9 @@ class FoxgloveMessage(ReceivedMessage):
         return self.format.encoding != "json"
 
     @property
-    def payload(self) -> bytes:
+    def payload(self) -> bytes | bytearray:
         """The message as the robot's node sent it, without the head of the frame."""
-        return bytes(memoryview(self.frame)[PAYLOAD:])
+        return self.frame[PAYLOAD:]
 
     def check_count(self) -> None:
         """Check the number of values in JSON; a reader of the others counts them."""

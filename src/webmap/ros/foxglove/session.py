@@ -5,6 +5,7 @@ import itertools
 import logging
 import time
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 from webmap.base.errors import BridgeClosed, BridgeError, ProtocolError, ServiceError
@@ -13,7 +14,7 @@ from webmap.ros.foxglove import protocol
 from webmap.ros.foxglove.messages import (
     FoxgloveMessage,
     RawMessage,
-    arguments_of,
+    format_of_channel,
     is_readable,
 )
 from webmap.ros.foxglove.protocol import (
@@ -515,10 +516,8 @@ def _fits(topic: Topic, channel: Channel) -> bool:
 
 def _subscribed(topic: Topic, channel: Channel) -> _Subscribed:
     raw = topic.options().encoding == "raw"
-    kind, arguments = RawMessage if raw else FoxgloveMessage, arguments_of(channel)
-    return _Subscribed(
-        topic, channel, lambda name, frame: kind(name, frame, *arguments)
-    )
+    kind, format = RawMessage if raw else FoxgloveMessage, format_of_channel(channel)
+    return _Subscribed(topic, channel, partial(kind, format=format))
 
 
 _HANDLERS: dict[type[Any], Callable[[Session, Any], None]] = {

@@ -9,7 +9,7 @@ import json
 import secrets
 import struct
 import time
-from collections.abc import Awaitable, Callable, Iterable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -70,8 +70,12 @@ class LinkFacts:
     """Bytes of a message in JSON, by topic, if it is too large for CBOR."""
 
 
-async def look(url: str) -> LinkFacts:
-    """Return the facts that a WebSocket handshake shows of a rosbridge.
+async def look(url: str, subprotocols: Sequence[str] = ()) -> LinkFacts:
+    """Return the facts that a WebSocket handshake shows of a bridge.
+
+    Args:
+        url: Its ``ws`` or ``wss`` address.
+        subprotocols: The subprotocols to offer.
 
     Raises:
         OSError: If the bridge cannot be reached.
@@ -79,10 +83,15 @@ async def look(url: str) -> LinkFacts:
     """
     from websockets.asyncio.client import connect
     from websockets.exceptions import WebSocketException
+    from websockets.typing import Subprotocol
 
     try:
         async with connect(
-            url, open_timeout=5.0, close_timeout=0.5, proxy=None
+            url,
+            subprotocols=[Subprotocol(name) for name in subprotocols] or None,
+            open_timeout=5.0,
+            close_timeout=0.5,
+            proxy=None,
         ) as socket:
             address = socket.remote_address
             peer = str(address[0]) if address else ""

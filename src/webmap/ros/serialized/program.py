@@ -1,13 +1,14 @@
 """The text of a function that reads messages of one type.
 
 Fields of fixed size that follow each other are read in one step of :mod:`struct`; those
-that nobody wants are padding there. A view is built directly.
+that nobody wants are padding there. Views are built directly.
 """
 
 import struct
 import types
 import typing
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import msgspec
@@ -16,6 +17,9 @@ from webmap.base.errors import ProtocolError
 from webmap.ros.arrays import Numbers
 from webmap.ros.definitions import FLOATS, INTEGERS, OCTETS, Field
 from webmap.ros.limits import MAX_VALUES
+from webmap.ros.serialized import layout
+from webmap.ros.serialized.layout import ANYWHERE, Place
+from webmap.ros.serialized.rows import Piece, Rows
 from webmap.ros.serialized.schemas import (
     CODES,
     SIZES,
@@ -25,7 +29,7 @@ from webmap.ros.serialized.schemas import (
     parts_of,
 )
 
-_COPIED = 1 << 16
+COPIED = 1 << 16
 """Bytes of a message up to which it is read as ``bytes``, which is faster."""
 
 
@@ -33,34 +37,17 @@ class _Skipped:
     """In place of a type: nobody wants the value."""
 
 
-class _Place(NamedTuple):
-    """What is known of a position: it is ``rest`` modulo ``unit``."""
-
-    unit: int
-    rest: int
-
-    def after(self, size: int) -> "_Place":
-        return _Place(self.unit, (self.rest + size) % self.unit)
-
-    def either(self, other: "_Place") -> "_Place":
-        """Return what is known if one of two places is the right one."""
-        unit = min(self.unit, other.unit)
-        while self.rest % unit != other.rest % unit:
-            unit //= 2
-        return _Place(unit, self.rest % unit)
-
-
-_ANYWHERE = _Place(1, 0)
-
-
 class Program:
-    """The text of a function ``read``, and the names in it.
+    """The text of a function ``read``, and the objects that it uses by their names.
 
     Args:
         schema: The type.
         wanted: The view to build, or None for a dict.
         encoding: The serialization.
         big: Whether the most significant byte of a number is the first.
+        usual: Whether the function leaves to ``other`` what is not usual: a message
+            longer than :data:`COPIED`, another beginning than that of little-endian
+            CDR, and text that is not UTF-8 or has no zero at its end.
 
     Raises:
         ProtocolError: If the schema has not the fields of the view.
@@ -73,41 +60,60 @@ class Program:
         wanted: type[msgspec.Struct] | None,
         encoding: Encoding,
         *,
-        big: bool,
+        big: bool = False,
+        usual: bool = False,
     ) -> None:
         self.names: dict[str, Any] = {}
         self._encoding = encoding
         self._cdr = encoding == "cdr"
         self._order = ">" if big else "<"
+        self._usual = usual
         self._lines: list[str] = []
         self._indent = 2
         self._count = 0
+        self._base = ""
+        self._offset = 4 if self._cdr else 0
+        self._place = Place(8, 0)
         self._format: list[str] = []
         self._found: list[str] = []
-        self._place = _Place(8, 0)
-        result = self._fields(schema.type, schema.fields, wanted or Any)
+        self._pieces: list[Piece] | None = None
+        self._columns = False
+        whole = Field("", schema.type, schema.fields)
+        if _is_row(whole, wanted or Any, encoding):
+            result = self._rows(whole, "1", wanted or Any)
+        else:
+            result = self._value(whole, wanted or Any)
         self._flush()
-        self.text = "\n".join(self._frame(result, big))
+        self.text = "\n".join(self._function(result))
 
-    def _frame(self, result: str, big: bool) -> list[str]:
-        """Return the lines of the function."""
-        head = 4 if self._cdr else 0
-        mark = b"\0\0" if big else b"\0\1"
+    def _function(self, result: str) -> list[str]:
+        """Return the lines of the whole function."""
+        if self._usual:
+            mark = r" or d[:2] != b'\0\1'" if self._cdr else ""
+            head = [
+                f"  if n > {COPIED}{mark}: return other(d)",
+                "  if type(d) is not bytes: d = bytes(d)",
+            ]
+            tail = ["  except UnicodeDecodeError: return other(d)"]
+        else:
+            head = [f"  d = memoryview(d) if n > {COPIED} else bytes(d)"]
+            tail = []
+        counts = any("left" in line for line in self._lines)
         return [
             "def read(d):",
             "  n = len(d)",
-            f"  if n > {_COPIED}: d = memoryview(d)",
-            "  elif type(d) is not bytes: d = bytes(d)",
-            *([f"  if n < 4 or d[:2] != {mark!r}: return other(d)"] * self._cdr),
-            f"  p = {head}; left = {MAX_VALUES}",
+            *head,
+            *[f"  left = {MAX_VALUES}"] * counts,
             "  try:",
             *self._lines,
             f"    r = {result}",
+            *tail,
             "  except (StructError, IndexError, ValueError) as e:",
             "    raise unfit(e) from None",
+            f"  p = {self._at}",
             "  if p > n: raise short()",
             # Vendors of DDS fill the last four bytes up.
-            f"  if n - p > {3 * self._cdr}: raise long(n - p)",
+            f"  if n - p > {3 if self._cdr else 0}: raise long(n - p)",
             "  return r",
         ]
 
@@ -119,7 +125,7 @@ class Program:
         return f"v{self._count}"
 
     def _named(self, value: Any) -> str:
-        """Return the name of an object in the text."""
+        """Return the name of an object."""
         for name, each in self.names.items():
             if each is value:
                 return name
@@ -127,119 +133,156 @@ class Program:
         self.names[name] = value
         return name
 
+    @property
+    def _at(self) -> str:
+        """The expression of the position; the fields to be read in one step begin."""
+        if not self._base or not self._offset:
+            return self._base or str(self._offset)
+        return f"{self._base} + {self._offset}"
+
+    def _move(self, position: str) -> str:
+        """Continue at a new position; return its name."""
+        self._base, self._offset = f"p{self._count}", 0
+        self._count += 1
+        self._line(f"{self._base} = {position}")
+        return self._base
+
     def _take(self, code: str, size: int, *, wanted: bool = True) -> str:
-        """Read a value whose size and place are known, with the next step."""
+        """Read a value with the next step; return its name."""
         self._place = self._place.after(size)
         self._format.append(code if wanted else f"{size}x")
-        if not wanted:
-            return ""
-        name = self._new()
-        self._found.append(name)
-        return name
+        return self._next_value() if wanted else ""
+
+    def _next_value(self) -> str:
+        """Return the name of the next value of a step, or its column in an array."""
+        column = f"u[{len(self._found)}::w]"
+        self._found.append(column if self._columns else self._new())
+        return self._found[-1]
+
+    def _made(self, template: str, values: Sequence[str]) -> str:
+        """Return the expression of something made of values, or of a column of it."""
+        if not self._columns:
+            return template.format(*values)
+        names = [self._new() for _ in values]
+        each = template.format(*names)
+        return f"({each} for {', '.join(names)}, in zip({', '.join(values)}))"
 
     def _flush(self) -> None:
         """Write the step that reads the fields of fixed size."""
         if not self._format:
             return
-        step = struct.Struct(self._order + "".join(self._format))
-        if self._found:
+        step = struct.Struct(self._order + _shortened(self._format))
+        if self._pieces is not None:
+            self._pieces.append(Piece(_shortened(self._format), step.size))
+        elif self._found:
             names = "".join(f"{name}, " for name in self._found)
-            self._line(f"{names}= {self._unpack(step)}(d, p)")
-        self._line(f"p += {step.size}")
-        self._format, self._found = [], []
-
-    def _unpack(self, step: struct.Struct) -> str:
-        return self._named(step.unpack_from)
+            unpack = self._named(step.unpack_from)
+            self._line(f"{names}= {unpack}(d, {self._at})")
+        self._offset += step.size
+        if self._pieces is None:
+            self._found = []
+        self._format = []
 
     def _align(self, size: int, condition: str = "") -> None:
-        """Move to the next multiple of ``size``; only CDR has padding."""
+        """Move to the next multiple of ``size``; only CDR has padding.
+
+        Args:
+            size: Bytes of the next number.
+            condition: When there is padding: ``if v1``; always if empty.
+
+        """
         if not self._cdr or size == 1:
             return
-        if self._place.unit >= size:
-            padding = -self._place.rest % size
-            if not padding:
-                return
-            if not condition:
-                self._take("", padding, wanted=False)
-                return
+        place = self._place.aligned(size)
+        padding = -self._place.rest % size if self._place.unit >= size else None
+        if padding == 0:
+            return
+        if padding and not condition:
+            self._take("", padding, wanted=False)
+            return
         self._flush()
-        # The offset of a place is counted from the end of the head of 4 bytes.
-        up = f"(p + {size - 1} & -{size})" if size < 8 else "(p + 3 & -8) + 4"
-        self._line(f"{condition}p = {up}")
-        self._place = _Place(size, 0)
+        self._place = place
+        if self._pieces is not None:
+            self._pieces.append(Piece(unit=size))
+            return
+        at = self._at
+        # A place is counted from the end of the head of 4 bytes.
+        up = f"({at} + {size - 1} & -{size})" if size < 8 else f"({at} + 3 & -8) + 4"
+        self._move(f"{up} {condition} else {at}" if condition else up)
 
-    def _fields(self, type: str, fields: Sequence[Field], hint: Any) -> str:
+    def _message(self, type: str, fields: Sequence[Field], hint: Any) -> str:
         """Read the fields of a message; return the expression of its value."""
-        hint = _without_none(hint)
         view = _view_fields(hint)
-        if view is None and hint is not _Skipped:
-            plain = self._dict(fields)
-            return self._as(plain, hint, hint is Any or hint == dict[str, Any])
-        values = {}
-        for field in fields:
-            known = view.pop(field.name, None) if view else None
-            inner = _Skipped if known is None else known.hint
-            value = self._value(field, inner)
-            if known is not None:
-                values[known.name] = value
+        if view is None:
+            inner = _Skipped if hint is _Skipped else Any
+            values = {each.name: self._value(each, inner) for each in fields}
+        else:
+            _check_view(type, fields, hint, view)
+            values = {}
+            for field in fields:
+                known = view.get(field.name)
+                value = self._value(field, _Skipped if known is None else known.hint)
+                if known is not None:
+                    values[known.name] = value
         if not fields and self._cdr:
             self._take("", 1, wanted=False)
         if hint is _Skipped:
             return ""
-        for name, known in (view or {}).items():
-            if known.required:
-                raise ProtocolError(
-                    f"{type} has no field {name!r}, which {hint.__name__} needs"
-                )
-        return self._call(hint, values)
+        if view is not None:
+            return self._call(hint, values)
+        parts = ", ".join(f"{name!r}: {{}}" for name in values)
+        made = self._made(f"{{{{{parts}}}}}", [*values.values()])
+        return self._as(made, hint, hint == dict[str, Any])
 
     def _call(self, view: type[msgspec.Struct], values: dict[str, str]) -> str:
         """Return the expression of a new struct; positional arguments are faster."""
-        arguments = []
+        first = []
+        defaults = {each.name: each.default for each in msgspec.structs.fields(view)}
         for name in view.__match_args__:
-            if name not in values:
+            if not values:
                 break
-            arguments.append(values.pop(name))
-        arguments += [f"{name}={value}" for name, value in values.items()]
-        return f"{self._named(view)}({', '.join(arguments)})"
-
-    def _dict(self, fields: Sequence[Field]) -> str:
-        parts = [f"{each.name!r}: {self._value(each, Any)}" for each in fields]
-        if not fields and self._cdr:
-            self._take("", 1, wanted=False)
-        return f"{{{', '.join(parts)}}}"
+            if name in values:
+                first.append(values.pop(name))
+            elif defaults[name] in (0, ""):
+                constant = repr(defaults[name])
+                first.append(f"repeat({constant})" if self._columns else constant)
+            else:
+                break
+        made = self._named(view)
+        if self._columns and not values:
+            return f"map({made}, {', '.join(first)})"
+        arguments = ["{}"] * len(first) + [f"{name}={{}}" for name in values]
+        template = f"{made}({', '.join(arguments)})"
+        return self._made(template, [*first, *values.values()])
 
     def _as(self, value: str, hint: Any, fits: bool) -> str:
         """Return the expression of a plain value as a value of a type."""
         if fits or hint is Any:
             return value
-        return f"convert({value}, {self._named(hint)})"
+        return self._made(f"convert({{}}, {self._named(hint)})", [value])
 
     def _value(self, field: Field, hint: Any) -> str:
+        """Read a field; return the expression of its value."""
         hint = _without_none(hint)
+        if field.is_array and field.type in CODES:
+            return self._numbers(field, hint)
         if field.is_array:
             return self._array(field, hint)
         parts = parts_of(field, self._encoding)
         if parts is not None:
-            return self._fields(field.type, parts, hint)
+            return self._message(field.type, parts, hint)
         if field.type == "string":
             return self._string(hint)
         size = SIZES[field.type]
         self._align(size)
         value = self._take(CODES[field.type], size, wanted=hint is not _Skipped)
-        return self._scalar(field.type, value, hint)
-
-    def _scalar(self, type: str, value: str, hint: Any) -> str:
-        if hint is _Skipped:
-            return ""
-        if hint is float and type in INTEGERS:
-            return f"float({value})"
-        fits = (
-            (hint is float and type in FLOATS)
-            or (hint is int and type in INTEGERS)
-            or (hint is bool and type == "bool")
-        )
-        return self._as(value, hint, fits)
+        if hint is float and field.type in INTEGERS:
+            return self._made("float({})", [value])
+        kinds: dict[Any, Container[str]] = {
+            **{float: FLOATS, int: INTEGERS},
+            **{bool: ("bool",), _Skipped: SIZES},
+        }
+        return self._as(value, hint, field.type in kinds.get(hint, ()))
 
     def _length(self) -> str:
         """Read the length of a string or an array; return its name."""
@@ -249,33 +292,36 @@ class Program:
         return length
 
     def _string(self, hint: Any) -> str:
+        if self._pieces is not None:
+            self._align(4)
+            self._flush()
+            self._pieces.append(Piece(is_text=True))
+            self._place = ANYWHERE
+            value = self._next_value()
+            column = f"map(texts.__getitem__, {value})"
+            return self._as(
+                column if self._columns else f"texts[{value}]", hint, hint is str
+            )
         length = self._length()
-        self._place = _ANYWHERE if self._cdr else self._place
+        self._place = ANYWHERE
         if hint is _Skipped:
-            self._line(f"p += {length}")
+            self._move(f"{self._at} + {length}")
             return ""
-        value = self._new()
-        self._line(f"q = p + {length}")
-        if self._cdr:
-            # Some writers leave out the zero at the end.
-            self._line("e = q if d[q - 1] else q - 1")
-            self._line(f"{value} = str(d[p:e], 'utf-8', 'replace'); p = q")
+        value, start = self._new(), self._at
+        if self._offset and self._base:
+            start = self._move(start)
+        end = self._move(f"{start} + {length}")
+        if not self._usual:
+            self._line(f"{value} = text(d[{start}:{end}])")
+        elif self._cdr:
+            self._line(f"if d[{end} - 1]: return other(d)")
+            self._line(f"{value} = d[{start}:{end} - 1].decode()")
         else:
-            self._line(f"{value} = str(d[p:q], 'utf-8', 'replace'); p = q")
+            self._line(f"{value} = d[{start}:{end}].decode()")
         return self._as(value, hint, hint is str)
 
-    def _array(self, field: Field, hint: Any) -> str:
-        if field.type in CODES:
-            return self._numbers(field, hint)
-        count = self._length() if field.size is None else str(field.size)
-        item, fits = _item_of(hint)
-        parts = parts_of(field, self._encoding)
-        found = self._records(field, count, parts, item) if parts else None
-        if found is None:
-            found = self._loop(field, count, item)
-        return found if hint is _Skipped else self._as(found, hint, fits)
-
     def _numbers(self, field: Field, hint: Any) -> str:
+        """Read an array of numbers."""
         size, code = SIZES[field.type], CODES[field.type]
         if field.size is not None:
             self._align(size)
@@ -283,87 +329,146 @@ class Program:
             data = self._take(f"{count}s", count, wanted=hint is not _Skipped)
         else:
             length = self._length()
-            self._align(size, f"if {length}: ")
-            unit = min(size, 4)
-            self._place = _Place(unit, 0) if self._cdr else self._place
-            move = f"p + {length} * {size}"
-            if hint is _Skipped:
-                self._line(f"p = {move}")
-                return ""
-            data = self._new()
-            self._line(f"q = {move}")
-            self._line("if q > n: raise short()")
-            self._line(f"{data} = d[p:q]; p = q")
+            self._align(size, f"if {length}")
+            data, start = self._new(), self._at
+            end = self._move(f"{start} + {length} * {size}")
+            self._place = layout.after_numbers(field.type)
+            if hint is not _Skipped:
+                self._line(f"if {end} > n: raise short()")
+                self._line(f"{data} = d[{start}:{end}]")
         if hint is _Skipped:
             return ""
         if isinstance(hint, type) and issubclass(hint, Numbers):
-            return f"packed({self._named(hint)}, {code!r}, {data})"
+            return self._made(f"packed({self._named(hint)}, {code!r}, {{}})", [data])
         if field.type in OCTETS:
-            return self._as(f"bytes({data})", hint, hint is bytes)
-        item, fits = _item_of(hint)
+            return self._as(self._made("bytes({})", [data]), hint, hint is bytes)
+        item = _item_of(hint)
         if field.type == "bool":
-            return self._as(f"[*map(bool, {data})]", hint, fits and item in (Any, bool))
-        values = f"numbers({code!r}, {data})"
-        kinds = FLOATS if item is float else INTEGERS if item is int else ()
-        if hint is not Any and fits and field.type in kinds:
-            return f"{values}.tolist()"
-        return self._as(values, hint, hint is Any)
+            values = self._made("[*map(bool, {})]", [data])
+            return self._as(values, hint, item in (Any, bool))
+        values = self._made(f"numbers({code!r}, {{}})", [data])
+        kinds: dict[Any, Any] = {float: FLOATS, int: INTEGERS}
+        if field.type in kinds.get(item, ()):
+            return self._made("{}.tolist()", [values])
+        return self._as(values, hint, False)
+
+    def _array(self, field: Field, hint: Any) -> str:
+        """Read an array of messages or of strings."""
+        count = self._length() if field.size is None else str(field.size)
+        item = _Skipped if hint is _Skipped else _item_of(hint)
+        one, parts = layout.one_of(field), parts_of(field, self._encoding)
+        record = layout.record_size(parts, self._encoding) if parts else None
+        if record is not None:
+            found = self._records(one, count, record, item or Any)
+        elif self._indent == 2 and _is_row(one, item, self._encoding):
+            found = self._rows(one, count, item or Any)
+        else:
+            found = self._loop(one, count, item or Any)
+        return found if hint is _Skipped else self._as(found, hint, item is not None)
 
     def _records(
-        self, field: Field, count: str, parts: Sequence[Field], hint: Any
-    ) -> str | None:
-        """Read an array of messages of one fixed size in one step, if they have one."""
-        size = _fixed_size(parts, self._encoding)
-        if not size:
-            return None
-        unit = size[1]
-        self._align(unit, f"if {count}: ")
-        place = _Place(min(unit, 4), 0) if self._cdr else self._place
+        self, one: Field, count: str, record: tuple[int, int], hint: Any
+    ) -> str:
+        """Read messages of one fixed size in one step."""
+        size, unit = record
+        self._align(unit, f"if {count}")
         self._flush()
-        self._line(f"q = p + {count} * {size[0]}")
+        start = self._at
+        end = self._move(f"{start} + {count} * {size}")
+        after = Place(min(unit, 4), 0)
         if hint is _Skipped:
-            self._line("p = q")
-            self._place = place
+            self._place = after
             return ""
-        self._check_count(count, "q > n", _values(field, self._encoding))
-        self._place = _Place(unit, 0)
-        value = self._fields(field.type, parts, hint)
-        step = struct.Struct(self._order + "".join(self._format))
-        assert step.size == size[0]
-        names = "".join(f"{name}, " for name in self._found)
-        self._format, self._found = [], []
-        self._place = place
-        found = self._new()
-        each = self._named(step.iter_unpack)
-        self._line(f"{found} = [{value} for ({names}) in {each}(d[p:q])]; p = q")
+        self._check_count(one, count, f"{end} > n")
+        self._place = Place(unit, 0)
+        value = self._value(one, hint)
+        step = struct.Struct(self._order + _shortened(self._format))
+        names, self._format, self._found = self._found, [], []
+        self._place = after
+        each = f"{self._named(step.iter_unpack)}(d[{start}:{end}])"
+        return self._list(value, names, each)
+
+    def _rows(self, one: Field, count: str, hint: Any) -> str:
+        """Read messages of fields of fixed size and strings in one step.
+
+        Args:
+            one: One of them.
+            count: Their number; if it is 1, there is no list.
+            hint: The type of one.
+
+        """
+        single = count == "1"
+        if not single:
+            least = least_size((one,), self._encoding)
+            self._check_count(one, count, f"{count} * {least} > n - ({self._at})")
+        pieces: list[Piece] = []
+        self._pieces, self._place, offset = pieces, ANYWHERE, self._offset
+        self._columns = not single and hint is not Any  # slower for a dict
+        value = self._value(one, hint)
+        self._flush()
+        columns, self._columns, self._pieces = self._columns, False, None
+        names, self._found = f"{', '.join(self._found)},", []
+        width = names.count(",")
+        self._place, self._offset = ANYWHERE, offset
+        rows = Rows(pieces, self._order, 4 if self._cdr else 0)
+        at, found, key, unpacked = self._at, self._new(), "n", names
+        if not single:
+            at, unpacked = self._move(at), "u"
+            key = f"({count}, n - {at}, {at} & 7)"
+            each = f"for {names} in zip(*[iter(u)] * w)"
+            value = f"[*{value}]" if columns else f"[{value} {each}]"
+            self._line(f"w = {width}")
+        plan = f"{self._named(rows.plan)}(d, {at}, {count}, {key})"
+        self._line(f"f, e = {self._named(rows.plans.get)}({key}) or {plan}")
+        self._line(f"{unpacked} = f(d, {at})")
+        self._line(f"try: {found} = {value}")
+        again = f"f, e = {plan}; {unpacked} = f(d, {at}); {found} = {value}"
+        self._line(f"except Misguess: {again}")
+        self._move(f"{at} + e")
         return found
 
-    def _check_count(self, count: str, too_many: str, values: int) -> None:
+    def _list(self, value: str, names: Sequence[str], each: str) -> str:
+        found = self._new()
+        values = "".join(f"{name}, " for name in names)
+        self._line(f"{found} = [{value} for ({values}) in {each}]")
+        return found
+
+    def _check_count(self, one: Field, count: str, too_many: str) -> None:
+        """Write the checks of the number of items, before any of them is built."""
         self._line(f"if {too_many}: raise short()")
-        self._line(f"left -= {count} * {values}")
+        self._line(f"left -= {count} * {layout.values_of(one, self._encoding)}")
         self._line("if left < 0: raise many()")
 
-    def _loop(self, field: Field, count: str, hint: Any) -> str:
-        """Read an array one by one."""
+    def _loop(self, one: Field, count: str, hint: Any) -> str:
+        """Read an array item by item."""
         self._flush()
-        one = _one(field)
         least = least_size((one,), self._encoding)
-        values = _values(field, self._encoding)
-        self._check_count(count, f"{count} * {least} > n - p", values)
-        after = _place_after(one, _ANYWHERE, self._encoding)
-        self._place = self._place.either(after) if self._cdr else self._place
-        place = self._place
-        found = "" if hint is _Skipped else self._new()
-        if found:
+        self._check_count(one, count, f"{count} * {least} > n - ({self._at})")
+        place = self._place.either(layout.place_after(one, ANYWHERE))
+        self._place = place
+        found = self._new()
+        if hint is not _Skipped:
             self._line(f"{found} = []")
+        start = self._move(self._at)
         self._line(f"for _ in range({count}):")
         self._indent += 1
         value = self._value(one, hint)
         self._flush()
-        self._line(f"{found}.append({value})" if found else "pass")
+        if hint is not _Skipped:
+            self._line(f"{found}.append({value})")
+        self._line(f"{start} = {self._at}")
         self._indent -= 1
-        self._place = place
+        self._base, self._offset, self._place = start, 0, place
         return found
+
+
+def _shortened(codes: Sequence[str]) -> str:
+    """Return codes of :mod:`struct` with a number for each repetition."""
+    counts = ((code, len([*same])) for code, same in groupby(codes))
+    return "".join(
+        f"{count}{code}" if len(code) == 1 and count > 1 else code * count
+        for code, count in counts
+    )
 
 
 class _ViewField(NamedTuple):
@@ -383,6 +488,20 @@ def _view_fields(hint: Any) -> dict[str, _ViewField] | None:
     }
 
 
+def _check_view(
+    type: str,
+    fields: Sequence[Field],
+    hint: type[msgspec.Struct],
+    view: dict[str, _ViewField],
+) -> None:
+    names = {field.name for field in fields}
+    for name, known in view.items():
+        if known.required and name not in names:
+            raise ProtocolError(
+                f"{type} has no field {name!r}, which {hint.__name__} needs"
+            )
+
+
 def _without_none(hint: Any) -> Any:
     """Return the type besides None; a message never has None."""
     if isinstance(hint, types.UnionType) or typing.get_origin(hint) is typing.Union:
@@ -391,95 +510,34 @@ def _without_none(hint: Any) -> Any:
     return hint
 
 
-def _item_of(hint: Any) -> tuple[Any, bool]:
-    """Return the type of the items of a list, and whether a list is wanted."""
-    if hint is _Skipped:
-        return _Skipped, True
+def _item_of(hint: Any) -> Any:
+    """Return the type of the items of a list; None if no list is wanted."""
     if hint is Any or hint is list:
-        return Any, True
-    if typing.get_origin(hint) is list:
-        return typing.get_args(hint)[0], True
-    return Any, False
+        return Any
+    return typing.get_args(hint)[0] if typing.get_origin(hint) is list else None
 
 
-def _one(field: Field) -> Field:
-    """Return one item of an array as a field."""
-    return Field(field.name, field.type, field.fields)
+def _is_row(field: Field, hint: Any, encoding: Encoding) -> bool:
+    """Return whether a message has a fixed size but for strings, all of them wanted.
 
-
-def _fixed_size(parts: Sequence[Field], encoding: Encoding) -> tuple[int, int] | None:
-    """Return size and alignment of messages that follow each other without padding.
-
-    None if their size varies, or if there is padding, or an array of messages in them.
+    In each message in it something must be wanted, too.
     """
-    sizes = _sizes_of(parts, encoding)
-    if not sizes:
-        return None
-    if encoding == "ros1":
-        return sum(size for size, _ in sizes), 1
-    unit, at = sizes[0][1], 0
-    for size, each in sizes:
-        at += -at % each + size
-        if each > unit:
-            return None
-    return (at, unit) if at % unit == 0 else None
-
-
-def _sizes_of(
-    parts: Sequence[Field], encoding: Encoding
-) -> list[tuple[int, int]] | None:
-    """Return size and alignment of all values in a message; None if they vary."""
-    found: list[tuple[int, int]] = []
-    for field in parts:
-        inner = parts_of(field, encoding)
-        varies = field.is_array and (field.size is None or inner is not None)
-        if varies or field.type == "string":
-            return None
-        if inner is not None:
-            sizes = _sizes_of(inner, encoding)
-            if sizes is None:
-                return None
-            found += sizes
-        else:
-            size = SIZES[field.type]
-            found.append((size * (1 if field.size is None else field.size), size))
-    if not parts and encoding == "cdr":
-        found.append((1, 1))
-    return found
-
-
-def _values(field: Field, encoding: Encoding) -> int:
-    """Return how many values one item of an array is, without the arrays in it."""
-    parts = parts_of(field, encoding) or ()
-    inner = (1 if each.is_array else _scalar_values(each, encoding) for each in parts)
-    return 1 + sum(inner)
-
-
-def _scalar_values(field: Field, encoding: Encoding) -> int:
-    return 0 if parts_of(field, encoding) is None else _values(field, encoding)
-
-
-def _place_after(field: Field, place: _Place, encoding: Encoding) -> _Place:
-    """Return what is known of the place after a field."""
+    hint = _without_none(hint)
     parts = parts_of(field, encoding)
-    if field.is_array and field.size is None:
-        place = _aligned(place, 4).after(4)
-        size = SIZES.get(field.type)
-        if size is not None:
-            return _Place(min(size, 4), 0)
-        return place.either(_place_after(_one(field), _ANYWHERE, encoding))
-    if (field.is_array and parts is not None) or field.type == "string":
-        return _ANYWHERE
-    if parts is not None:
-        for each in parts:
-            place = _place_after(each, place, encoding)
-        return place if parts else place.after(1)
-    size = SIZES[field.type]
-    count = 1 if field.size is None else field.size
-    return _aligned(place, size).after(size * count)
-
-
-def _aligned(place: _Place, size: int) -> _Place:
-    if place.unit < size:
-        return _Place(size, 0)
-    return place.after(-place.rest % size)
+    if field.is_array:
+        return parts is None and field.type != "string" and field.size is not None
+    if parts is None:
+        return field.type != "string" or hint is not _Skipped
+    view = _view_fields(hint)
+    hints = {
+        each.name: view[each.name].hint
+        if view and each.name in view
+        else Any
+        if view is None and hint is not _Skipped
+        else _Skipped
+        for each in parts
+    }
+    wanted = any(each is not _Skipped for each in hints.values())
+    return (wanted or hint is _Skipped) and all(
+        _is_row(each, hints[each.name], encoding) for each in parts
+    )

@@ -4,8 +4,9 @@ import struct
 import sys
 from array import array
 from collections.abc import Callable
-from functools import lru_cache
-from typing import Any, NoReturn, TypeAlias
+from functools import lru_cache, partial
+from itertools import repeat
+from typing import Any, TypeAlias
 
 import msgspec
 
@@ -14,6 +15,7 @@ from webmap.ros.arrays import NOT_COPIED, Numbers
 from webmap.ros.decoding import convert
 from webmap.ros.limits import GENERAL, MAX_VALUES, TooLarge
 from webmap.ros.serialized.program import Program
+from webmap.ros.serialized.rows import Misguess, Texts, text_of
 from webmap.ros.serialized.schemas import Encoding, Schema
 
 Reader: TypeAlias = Callable[[bytes | bytearray | memoryview], Any]
@@ -35,8 +37,8 @@ def make_reader(
     Args:
         schema: The definition of the type.
         wanted: A view of the type; the reader skips the fields that it has not. None
-            for a dict with all fields, as a link to a rosbridge gives it: arrays of numbers are
-            ``array.array``, ``uint8[]`` is ``bytes``.
+            for a dict with all fields, where arrays of numbers are ``array.array`` and
+            ``uint8[]`` is ``bytes``, as a link to a rosbridge has them.
         encoding: The serialization of the messages.
 
     Returns:
@@ -49,52 +51,46 @@ def make_reader(
         ProtocolError: If the schema has not the fields of ``wanted``.
 
     """
-    if encoding == "ros1":
-        return _compiled(schema, wanted, encoding, False, _Refusal(schema))
-    big = lru_cache(maxsize=1)(
-        lambda: _compiled(schema, wanted, encoding, True, _Refusal(schema))
-    )
 
     def other(data: bytes | bytearray | memoryview) -> Any:
-        if bytes(data[:2]) == b"\0\0" and len(data) >= 4:
-            return big()(data)
-        raise _unknown_kind(schema, data)
+        """Read what the function for usual messages does not."""
+        big = encoding == "cdr" and _is_big(schema, data)
+        if big not in unusual:
+            program = Program(schema, wanted, encoding, big=big)
+            unusual[big] = _compiled(schema, program, encoding, other, big=big)
+        return unusual[big](data)
 
-    return _compiled(schema, wanted, encoding, False, other)
-
-
-class _Refusal:
-    def __init__(self, schema: Schema) -> None:
-        self.schema = schema
-
-    def __call__(self, data: bytes | bytearray | memoryview) -> NoReturn:
-        raise _unknown_kind(self.schema, data)
+    unusual: dict[bool, Reader] = {}
+    program = Program(schema, wanted, encoding, usual=True)
+    return _compiled(schema, program, encoding, other)
 
 
-def _unknown_kind(
-    schema: Schema, data: bytes | bytearray | memoryview
-) -> ProtocolError:
-    head = bytes(data[:2])
-    if len(data) < 4:
-        return ProtocolError(
-            f"got a {schema.type} of {len(data)} bytes; CDR begins with 4 bytes"
+def _is_big(schema: Schema, data: bytes | bytearray | memoryview) -> bool:
+    """Return whether CDR is big-endian."""
+    head = bytes(data[:4])
+    if len(head) < 4:
+        raise ProtocolError(
+            f"got a {schema.type} of {len(head)} bytes; CDR begins with 4 bytes"
         )
-    kind = _KINDS.get(int.from_bytes(head, "big"), "an unknown encoding")
-    return ProtocolError(
-        f"got a {schema.type} that begins with {head.hex(' ')} ({kind}); expected "
-        "CDR, which begins with 00 00 or 00 01"
-    )
+    if head[0] or head[1] > 1:
+        kind = _KINDS.get(head[1], "unknown") if not head[0] else "unknown"
+        raise ProtocolError(
+            f"got a {schema.type} that begins with {head[:2].hex(' ')} ({kind}); "
+            "expected CDR, which begins with 00 00 or 00 01"
+        )
+    return not head[1]
 
 
 def _compiled(
     schema: Schema,
-    wanted: type[msgspec.Struct] | None,
+    program: Program,
     encoding: Encoding,
-    big: bool,
     other: Reader,
+    *,
+    big: bool = False,
 ) -> Reader:
-    program = Program(schema, wanted, encoding, big=big)
-    foreign = big != _NATIVE_IS_BIG
+    """Return the function of a program."""
+    foreign, ends = big != _NATIVE_IS_BIG, encoding == "cdr"
 
     def numbers(code: str, data: bytes | memoryview) -> "array[Any]":
         found: array[Any] = array(code, bytes(data))
@@ -136,9 +132,13 @@ def _compiled(
         **program.names,
         "array": array,
         "convert": convert,
+        "text": partial(text_of, ends=ends),
+        "texts": Texts(big=big, ends=ends),
+        "Misguess": Misguess,
         "long": long,
         "many": many,
         "numbers": numbers,
+        "repeat": repeat,
         "other": other,
         "packed": packed,
         "short": short,
