@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import json
 import struct
+import time
 
 import pytest
 from link_bench import in_loop, until
@@ -12,6 +13,7 @@ from websockets.asyncio.server import serve
 from websockets.exceptions import ConnectionClosed
 
 from equipment.gate_harness import spec
+from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Twist
 from webmap.gate.actions import SendGoal, SendPose
 from webmap.gate.clock import now
@@ -334,6 +336,9 @@ class TestServers:
         [
             ('{"op": "status", "level": 2, "message": "no such type"}', "no such type"),
             ('{"op": "status"', "not Foxglove's protocol"),
+            ('{"op": "advertise", "channels": [7]}', "not Foxglove's protocol"),
+            (f'{{"op": "status", "message": "{"m" * 65536}"}}', "operation status of"),
+            (b"\2", ""),
             (b"\1", "message data of 1 bytes"),
             (b"\1" + bytes(sockets.MAX_FRAME), "a message of 1048577 bytes"),
         ],
@@ -581,6 +586,16 @@ class TestTasks:
         (_, number, rest) = server.published[-1]
         assert number == 5
         assert rest[-24:] == bytes(24)
+
+
+@pytest.mark.parametrize("part", [b"[],", b"1,", b'{"id":1,"topic":"","encoding":""},'])
+def test_a_long_list_of_channels_blocks_nobody_for_long(part):
+    count = sockets.MAX_OFFER // len(part) - 10
+    text = b'{"op":"advertise","channels":[' + part * count + b"[]]}"
+    begun = time.thread_time()
+    with pytest.raises(ProtocolError, match="not Foxglove's protocol"):
+        foxglove.read_text(text)
+    assert time.thread_time() - begun < 0.25
 
 
 def test_the_message_of_rosbags_is_that_of_this_test():

@@ -101,8 +101,8 @@ def agent(
 
     URL is the address of the robot's rosbridge or Foxglove bridge; FILE is a fleet file
     with one bridge, for limits, buttons and an alignment. The agent connects to a
-    router and listens on nothing. Displays reach its robots with webmap view zenoh://HOST:7447. If the
-    network or the display fails, the agent stops the robot.
+    router and listens on nothing. Displays reach its robots with webmap view
+    zenoh://HOST:7447. If the network or the display fails, the agent stops the robot.
 
     \b
     webmap agent ws://localhost:9090 --router zenohs://fleet.example:7447 --name bay3
