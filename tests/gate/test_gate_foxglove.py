@@ -32,6 +32,7 @@ from webmap.gate.lanes.calls import ServiceCalls
 from webmap.gate.lanes.control import MOST, ControlLane
 from webmap.gate.lanes.odometry import OdometryLane
 from webmap.gate.lanes.tasks import TasksLane, goal_topics, hook_topics
+from webmap.ros.names import web_socket_url
 
 SDK, OLD = "foxglove.sdk.v1", "foxglove.websocket.v1"
 ZERO, SLOW = Twist(), Twist(0.125)
@@ -596,6 +597,25 @@ def test_a_long_list_of_channels_blocks_nobody_for_long(part):
     with pytest.raises(ProtocolError, match="not Foxglove's protocol"):
         foxglove.read_text(text)
     assert time.thread_time() - begun < 0.25
+
+
+@pytest.mark.parametrize(
+    ("url", "expected"),
+    [
+        ("foxglove://robot", "ws://robot:8765"),
+        ("foxgloves://robot:9", "wss://robot:9"),
+        ("ws://robot:9090", "ws://robot:9090"),
+    ],
+)
+def test_the_address_of_the_socket_has_the_port_of_foxglove(url, expected):
+    assert web_socket_url(url) == expected
+
+
+@in_loop
+async def test_an_action_goal_that_cannot_be_written_is_dropped():
+    with Tasks("ws://127.0.0.1:1") as noting:
+        goal = SendGoal(*(*GOAL_FIELDS, "navigate_to_pose"))
+        assert not noting.lane.send(spec(action="/go"), goal)
 
 
 def test_the_message_of_rosbags_is_that_of_this_test():
