@@ -110,7 +110,8 @@ test-web: $(NODE)
 GATE_BESIDE := $(addprefix tests/gate/test_gate_,client.py assist_road.py machine.py recorded.py schedules.py) \
   $(addprefix tests/ros/test_ros_,image_answer.py incoming.py large.py leaving.py offload.py \
   offload_parts.py paced.py questions.py renewal.py timing.py unwatched.py work.py)
-WITH_GATE := $(filter-out $(GATE_BESIDE),$(wildcard tests/gate/test_*.py tests/base/test_*.py tests/ros/test_*.py))
+WITH_GATE := $(filter-out $(GATE_BESIDE),$(wildcard tests/gate/test_*.py tests/base/test_*.py tests/ros/test_*.py)) \
+  tests/ros/foxglove/test_foxglove_protocol.py
 test-gate: $(DEV)
 	$(BIN)/pytest -q $(TO_RESULTS) -n $(JOBS) -m "not serial" $(WITH_GATE) \
 	  --cov --cov-config=tests/gate/coverage.toml --cov-fail-under=100

@@ -216,6 +216,17 @@ def test_a_new_robot_gets_a_unique_name(bridge, capsys):
     late.robots[0].destroy()
 
 
+@pytest.mark.parametrize("accepted", [False, True])
+def test_driving_without_proof_is_declared_to_the_gate_only_if_asked_for(
+    bridge, accepted
+):
+    late = ViewRobots(Console(), Overrides(drive_without_proof=accepted))
+    late.add(Candidate(bridge, found()))
+    (made,) = late.robots
+    assert made.motion.spec().drive_without_proof is accepted
+    made.destroy()
+
+
 def test_a_discovered_robot_gets_its_frames_plan_and_four_cameras(bridge):
     late = ViewRobots(Console())
     more = {"/tf": "tf2_msgs/TFMessage", "/plan": "nav_msgs/Path"}

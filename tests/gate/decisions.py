@@ -82,6 +82,7 @@ class Decisions:
         # What most robots do not have is not part of the record.
         line = re.sub(r", check(ed|_every)?=None", "", line)
         line = HOOK.sub(r"{'\1': '\2', 'type': '\3'}", line)
+        line = re.sub(r", (only_echoes|drive_without_proof)=False", "", line)
         if "WebMap-" in line:
             line = re.sub(r"WebMap-\w+-\d+", lambda match: self._number(match[0]), line)
         self.count += 1

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from webmap.base.geometry import Twist
 from webmap.base.outline import polygon_around
 from webmap.gate.events import Scan
-from webmap.gate.lanes.odometry import parse_scan
+from webmap.gate.lanes.scans import parse_scan
 from webmap.gate.protocol import AssistSpec
 from webmap.gate.rules.assist import FREE, assist, free_way, points_of
 from webmap.gate.rules.scan_geometry import LIMIT, MOST, folded

@@ -44,7 +44,7 @@ def ranges_seen(bridge):
     """Return the current ranges of the scanner, received by a separate client."""
     from websockets.sync.client import connect
 
-    from webmap.gate.lanes.odometry import parse_scan, subscribe
+    from webmap.gate.lanes.scans import parse_scan, subscribe
 
     with connect(bridge, max_size=None) as link:
         link.send(subscribe("/base_scan", "t").decode())

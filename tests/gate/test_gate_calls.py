@@ -4,8 +4,8 @@ import json
 
 from link_bench import in_loop, noting_bridge, raw_bridge, until
 
-from webmap.gate.lanes import tasks
-from webmap.gate.lanes.tasks import ServiceCalls
+from webmap.gate.lanes import calls
+from webmap.gate.lanes.calls import RosbridgeCall, ServiceCalls
 
 
 def request(id, service="/e_stop"):
@@ -16,8 +16,8 @@ def request(id, service="/e_stop"):
 async def test_each_call_has_its_own_socket_that_closes_after_the_answer(caplog):
     async with noting_bridge() as bridge:
         made = ServiceCalls(bridge.url)
-        made.call(request("a"), "a", "/e_stop")
-        made.call(request("b"), "b", "/e_stop")
+        made.call(RosbridgeCall(request("a"), "a"), "/e_stop")
+        made.call(RosbridgeCall(request("b"), "b"), "/e_stop")
         await made.settle()
         assert {t.message["id"] for t in bridge.of("call_service")} == {"a", "b"}
         assert len({t.link for t in bridge.received}) == 2
@@ -28,14 +28,14 @@ async def test_each_call_has_its_own_socket_that_closes_after_the_answer(caplog)
 
 @in_loop
 async def test_a_hanging_call_blocks_no_other_call_and_times_out(monkeypatch, caplog):
-    monkeypatch.setattr(tasks, "CALL_TIMEOUT", 1.0)
+    monkeypatch.setattr(calls, "CALL_TIMEOUT", 1.0)
     async with noting_bridge() as bridge:
         bridge.answers_services = False
         made = ServiceCalls(bridge.url)
-        made.call(request("hangs"), "hangs", "cancelling")
+        made.call(RosbridgeCall(request("hangs"), "hangs"), "cancelling")
         await until(lambda: bridge.of("call_service"), "the first call")
         bridge.answers_services = True
-        made.call(request("second"), "second", "/e_stop")
+        made.call(RosbridgeCall(request("second"), "second"), "/e_stop")
         await until(lambda: len(made._calling) == 1, "the end of the second")
         assert caplog.records == []
         await made.settle()
@@ -51,7 +51,7 @@ async def test_only_the_answer_with_the_id_of_the_call_ends_the_call():
     async with noting_bridge() as bridge:
         bridge.answers_services = False
         made = ServiceCalls(bridge.url)
-        made.call(request("a"), "a", "/e_stop")
+        made.call(RosbridgeCall(request("a"), "a"), "/e_stop")
         await until(lambda: bridge.of("call_service"), "the call")
         await bridge.send(1, "rubbish")
         await bridge.send(1, '{"op": "service_response", "id": "another"}')
@@ -70,7 +70,7 @@ async def test_a_call_without_a_connection_is_logged_as_failed(caplog):
 
     async with raw_bridge(talk) as url:
         made = ServiceCalls(url)
-        made.call(request("a"), "a", "/e_stop")
+        made.call(RosbridgeCall(request("a"), "a"), "/e_stop")
         await made.settle()
         assert caplog.text.count("/e_stop: no connection: ") == 1
         assert "503" in caplog.text
@@ -81,7 +81,7 @@ async def test_a_call_ends_with_a_log_entry_when_its_connection_is_lost(caplog):
     async with noting_bridge() as bridge:
         bridge.answers_services = False
         made = ServiceCalls(bridge.url)
-        made.call(request("a"), "a", "/e_stop")
+        made.call(RosbridgeCall(request("a"), "a"), "/e_stop")
         await until(lambda: bridge.of("call_service"), "the call")
         bridge.transport_of(1).abort()
         await made.settle()
@@ -94,7 +94,7 @@ async def test_closing_the_calls_closes_their_sockets_without_a_log_entry(caplog
     async with noting_bridge() as bridge:
         bridge.answers_services = False
         made = ServiceCalls(bridge.url)
-        made.call(request("a"), "a", "/e_stop")
+        made.call(RosbridgeCall(request("a"), "a"), "/e_stop")
         await until(lambda: bridge.of("call_service"), "the call")
         made.close()
         await made.settle()

@@ -11,7 +11,7 @@ from webmap.base.errors import ProtocolError
 from webmap.gate import pipe, protocol
 from webmap.gate.actions import SendGoal
 from webmap.gate.events import Key
-from webmap.gate.lanes import navigation, odometry, rosbridge
+from webmap.gate.lanes import navigation, rosbridge, scans
 from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.sockets import SocketHandlers, open_socket
 
@@ -88,12 +88,12 @@ def list_of(count, each):
 )
 def test_a_scan_of_many_parts_is_refused_before_it_is_decoded(ranges):
     with pytest.raises(ProtocolError, match="more than 1000 lists, maps and texts"):
-        odometry.parse_scan(scan(ranges), 0.0)
+        scans.parse_scan(scan(ranges), 0.0)
 
 
 def test_a_scan_that_nests_too_deeply_is_refused():
     with pytest.raises(ProtocolError, match="not CBOR"):
-        odometry.parse_scan(scan(b"\x81" * 900 + b"\x00"), 0.0)
+        scans.parse_scan(scan(b"\x81" * 900 + b"\x00"), 0.0)
 
 
 @pytest.mark.parametrize(
@@ -108,7 +108,7 @@ def test_a_scan_that_nests_too_deeply_is_refused():
     ids=["doubles", "singles", "mixed", "typed", "longest typed"],
 )
 def test_a_scan_of_many_numbers_is_accepted(ranges):
-    odometry.check_parts(scan(ranges))
+    scans.check_parts(scan(ranges))
 
 
 def test_deeply_nested_data_on_the_pipe_is_logged_and_skipped(caplog):

@@ -8,10 +8,10 @@ from link_bench import frame, in_loop, noting_bridge, raw_bridge, until
 from equipment.gate_harness import KEY, URL, Bench, spec
 from webmap.gate import actions, events, protocol
 from webmap.gate.display import pages
-from webmap.gate.lanes import navigation, tasks
+from webmap.gate.lanes import calls, navigation
+from webmap.gate.lanes.calls import RosbridgeCall, ServiceCalls
 from webmap.gate.lanes.links import Links
 from webmap.gate.lanes.navigation import answer_to
-from webmap.gate.lanes.tasks import ServiceCalls
 from webmap.gate.limits import Cap
 from webmap.gate.protocol import StopHook
 
@@ -80,9 +80,8 @@ class TestCall:
         async with noting_bridge() as bridge:
             bridge.answers_services = False
             ended, made = [], ServiceCalls(bridge.url)
-            made.call(
-                b'{"op": "call_service", "id": "a"}', "a", "/e_stop", ended.append
-            )
+            call = RosbridgeCall(b'{"op": "call_service", "id": "a"}', "a")
+            made.call(call, "/e_stop", ended.append)
             await until(lambda: bridge.of("call_service"), "the call")
             await bridge.send(1, response(result=False, values=NO_SUCH).decode())
             await made.settle()
@@ -98,7 +97,7 @@ class TestCall:
 
         async with raw_bridge(talk) as url:
             ended, made = [], ServiceCalls(url)
-            made.call(b"{}", "a", "/e_stop", ended.append)
+            made.call(RosbridgeCall(b"{}", "a"), "/e_stop", ended.append)
             await made.settle()
         (why,) = ended
         assert why.startswith("no ")
@@ -134,7 +133,7 @@ class Activity:
 class TestLinks:
     @in_loop
     async def test_the_links_report_the_result_of_every_stop_hook(self, monkeypatch):
-        monkeypatch.setattr(tasks, "CALL_TIMEOUT", 0.5)
+        monkeypatch.setattr(calls, "CALL_TIMEOUT", 0.5)
         async with noting_bridge() as bridge, Activity(bridge.url) as doing:
             doing.run(LOCK, 1)
             assert doing.of(events.HookEnded) == [events.HookEnded("r1", LOCK, 1, None)]

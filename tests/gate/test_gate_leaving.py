@@ -9,9 +9,10 @@ from equipment.gate_harness import spec
 from equipment.hanging_bridge import hanging_bridge, until
 from webmap.gate.actions import SendGoal
 from webmap.gate.events import EchoReceived, Key, LinkUp
+from webmap.gate.lanes.calls import ServiceCalls
 from webmap.gate.lanes.control import ControlLane
 from webmap.gate.lanes.odometry import OdometryLane
-from webmap.gate.lanes.tasks import ServiceCalls, TasksLane
+from webmap.gate.lanes.tasks import TasksLane
 
 pytestmark = pytest.mark.slow
 

@@ -17,7 +17,10 @@ def decoded(data):
 
 def goal_by(way, **changes):
     goal = SendGoal(KEY, "r1", "g1", 1.0, 2.0, math.pi, "a", way)
-    return decoded(rosbridge.goal(spec(**changes), goal))
+    if way == "navigate_to_pose":
+        return decoded(rosbridge.action_goal(spec(**changes), goal))
+    topic, _, message = rosbridge.goal_message(spec(**changes), goal)
+    return {"op": "publish", "topic": topic, "msg": message}
 
 
 @pytest.mark.parametrize(
@@ -108,10 +111,11 @@ def test_an_action_goal_is_sent_with_send_action_goal():
 
 
 def test_cancels_hooks_and_poses_are_encoded():
-    assert decoded(rosbridge.cancel_by_topic("/cancel"))["msg"] == {}
+    assert rosbridge.cancel_message("/cancel") == ("/cancel", rosbridge.GOAL_ID, {})
     cancel = decoded(rosbridge.cancel_by_service("/go", "c1"))
     assert cancel["service"] == "/go/_action/cancel_goal"
-    assert decoded(rosbridge.flag("/lock", True))["msg"] == {"data": True}
+    flag = rosbridge.flag("/lock", "std_msgs/Bool", True)
+    assert flag == ("/lock", "std_msgs/Bool", {"data": True})
     call = decoded(rosbridge.trigger("/e_stop", "std_srvs/Trigger", "t1"))
     assert (call["op"], call["service"], call["id"]) == (
         "call_service",
@@ -119,10 +123,10 @@ def test_cancels_hooks_and_poses_are_encoded():
         "t1",
     )
     located = spec(pose_topic="/initialpose", pose_covariance=(0.1, 0.2, 0.3))
-    pose = decoded(
-        rosbridge.pose_estimate(located, SendPose(KEY, "r1", 1.0, 2.0, 0.0, "a"))
-    )
-    covariance = pose["msg"]["pose"]["covariance"]
+    at = SendPose(KEY, "r1", 1.0, 2.0, 0.0, "a")
+    topic, _, message = rosbridge.pose_estimate(located, at)
+    assert topic == "/initialpose"
+    covariance = message["pose"]["covariance"]
     assert (covariance[0], covariance[7], covariance[35]) == (0.1, 0.2, 0.3)
 
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from equipment.captured_frames import frame_file
 from webmap.base.errors import ProtocolError
-from webmap.gate.lanes.odometry import parse_scan, subscribe
+from webmap.gate.lanes.scans import parse_scan, subscribe
 
 
 @pytest.mark.parametrize("dialect", ["ros1", "ros2"])

@@ -71,7 +71,7 @@ def test_the_motion_configuration_imports_nothing_of_the_display() -> None:
 def test_parsing_a_scan_in_the_gate_loads_cbor2_as_the_only_heavy_package() -> None:
     loaded = loaded_by(
         "import webmap.gate.__main__, cbor2\n"
-        "from webmap.gate.lanes.odometry import parse_scan\n"
+        "from webmap.gate.lanes.scans import parse_scan\n"
         "fields = ('angle_min', 'angle_increment', 'range_min', 'range_max')\n"
         "scan = dict.fromkeys(fields, 1.0)\n"
         "scan['ranges'] = cbor2.CBORTag(85, bytes(8))\n"

@@ -35,11 +35,12 @@ READY = r"is ready at zenoh://127\.0\.0\.1:(\d+)"
 class FarDriver:
     """A display with an operator; see ``safety_driver.py``."""
 
-    def __init__(self, port, state):
+    def __init__(self, url, robot, state):
+        self._robot = robot
         self.reports, self.refused = [], []
         self.acquired, self.lost = [], []
         self.popen = subprocess.Popen(
-            [sys.executable, DRIVER, f"zenoh://127.0.0.1:{port}/bay3", ROBOT],
+            [sys.executable, DRIVER, url, robot],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -83,7 +84,7 @@ class FarDriver:
         kinds = {"robot": self.reports, "acquired": self.acquired, "lost": self.lost}
         for line in self.popen.stdout:
             message = json.loads(line)
-            if message.get("robot") in (ROBOT, None):
+            if message.get("robot") in (self._robot, None):
                 kinds.get(message["op"], self.refused).append(message)
 
 
@@ -143,7 +144,8 @@ class AgentBench:
             self.agent.end(signal.SIGTERM)
 
     def new_driver(self, name):
-        driver = FarDriver(self.display_hop.port, self._folder / name)
+        url = f"zenoh://127.0.0.1:{self.display_hop.port}/bay3"
+        driver = FarDriver(url, ROBOT, self._folder / name)
         self._open.callback(driver.end)
         wait_for(lambda: driver.now.get("link") == "up", "a report of the agent", 30)
         return driver

@@ -119,6 +119,7 @@ def main() -> None:
         w_max=1.5,
         odometry_topic="/odom",
         odometry_type="nav_msgs/Odometry",
+        drive_without_proof=True,
     )
     client.declare(spec)
     operator, ended = Operator(client), threading.Event()

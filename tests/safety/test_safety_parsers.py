@@ -52,7 +52,7 @@ PARSERS = {
     "gate.lanes.navigation:of_action": ("GOAL",),
     "gate.lanes.navigation:of_topics": ("SPEC", "GOAL"),
     "gate.lanes.odometry:check_parts": (),
-    "gate.lanes.odometry:parse_scan": (1.0,),
+    "gate.lanes.scans:parse_scan": (1.0,),
     "gate.lanes.rosbridge:check_parts": (),
     "gate.lanes.rosbridge:parse": (),
     "gate.lanes.rosbridge:plain": (),

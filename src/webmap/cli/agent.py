@@ -41,6 +41,12 @@ from webmap.cli.options import Finite, tls_options, verbose_option
     "commands end. Without it, the limits are 0.3 m/s and 0.6 rad/s.",
 )
 @click.option(
+    "--drive-without-proof",
+    is_flag=True,
+    help="Dangerous: drive through a foxglove_bridge older than version 3, as in "
+    "webmap view.",
+)
+@click.option(
     "--operators",
     metavar="USER,USER",
     help="Users of the router whose pages may drive; pages of all others may only look "
@@ -83,6 +89,7 @@ def agent(
     robots: tuple[str, ...],
     settings: tuple[str, ...],
     stops_within: float | None,
+    drive_without_proof: bool,
     operators: str | None,
     rates: tuple[str, ...],
     beams: tuple[str, ...],
@@ -120,12 +127,16 @@ def agent(
         echo(systemd_unit(name, sys.argv[1:]), lines=True)
         return
     RobotMotion.agent = checked_name(name)
-    overrides = Overrides([parse_setting(text) for text in settings], stops_within)
+    overrides = Overrides(
+        [parse_setting(text) for text in settings],
+        stops_within,
+        drive_without_proof=drive_without_proof,
+    )
     throttles, most = parse_rates(rates), parse_beams(beams)
     roles = None if operators is None else parse_operators(operators)
     if "://" in robot:
         held = robots_behind(robot, robots, overrides, wait)
-    elif robots or settings or stops_within is not None:
+    elif robots or settings or stops_within is not None or drive_without_proof:
         raise click.UsageError("the fleet file has all settings of its robots")
     else:
         held = robots_in_file(Path(robot))

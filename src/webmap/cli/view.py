@@ -55,6 +55,12 @@ from webmap.cli.options import (
     "commands end. Without it, the limits are 0.3 m/s and 0.6 rad/s.",
 )
 @click.option(
+    "--drive-without-proof",
+    is_flag=True,
+    help="Dangerous: drive through a foxglove_bridge older than version 3. Any of its "
+    "clients can hold back every velocity and STOP, and WebMap may not notice at once.",
+)
+@click.option(
     "--floor",
     type=click.Path(exists=True, dir_okay=False),
     help="A floor plan in map_server's format (YAML), drawn under the robots.",
@@ -83,6 +89,7 @@ def view(
     settings: tuple[str, ...],
     show: bool,
     stops_within: float | None,
+    drive_without_proof: bool,
     floor: str | None,
     discover: bool,
     wait: float,
@@ -119,7 +126,11 @@ def view(
     from webmap.ros.names import is_agent_url
 
     one_bridge(url, topics)
-    overrides = Overrides([parse_setting(text) for text in settings], stops_within)
+    overrides = Overrides(
+        [parse_setting(text) for text in settings],
+        stops_within,
+        drive_without_proof=drive_without_proof,
+    )
     bridges = [webmap.Bridge(text) for text in url if not is_agent_url(text)]
     given = parse_robots(robots, bridges)
     plan = Path(floor) if floor else None

@@ -118,6 +118,9 @@ class TwistConfig(TopicConfig, kw_only=True, frozen=True):
     robot drives slowly."""
     holonomic: bool = False
     """Whether the base can move sideways."""
+    drive_without_proof: bool = False
+    """Whether the robot may be moved through an old ``foxglove_bridge``, which any of
+    its clients can stall, and which does not show what has arrived."""
     stop_hooks: list[StopHook] = []
     bridge: str = ""
 

@@ -128,6 +128,7 @@ class MovableRobot(Extendable):
         rx_max: float | None = None,
         ry_max: float | None = None,
         check_every: float | str | None = None,
+        drive_without_proof: bool = False,
     ) -> None:
         """Set the topic for velocity, with the limits and the behaviour of the base.
 
@@ -162,6 +163,11 @@ class MovableRobot(Extendable):
             check_every: How long a check before driving counts, in seconds or as in
                 ``"12h"``. Without such a check, the speed limits are 0.3 m/s and
                 0.6 rad/s. If left out, no check is demanded.
+            drive_without_proof: Whether the robot may be moved through a
+                ``foxglove_bridge`` older than version 3. Dangerous: any client of such
+                a bridge can hold back every velocity, zero and STOP included, without a
+                limit, and WebMap learns what has arrived only from the velocities that
+                come back.
 
         Raises:
             ConfigError: If ``type`` carries no velocity, or a number or a stop hook is

@@ -128,14 +128,23 @@ class Overrides:
     Args:
         settings: Settings of one robot each, in their order on the command line.
         stops_within: Command timeout of every base, in seconds, if known.
+        drive_without_proof: Whether robots may be moved through an old bridge of
+            Foxglove.
 
     """
 
     def __init__(
-        self, settings: Sequence[Setting] = (), stops_within: float | None = None
+        self,
+        settings: Sequence[Setting] = (),
+        stops_within: float | None = None,
+        *,
+        drive_without_proof: bool = False,
     ) -> None:
         self._settings = tuple(settings)
-        self._stops_within = stops_within
+        self._of_every_base = {
+            "stops_within": stops_within,
+            "drive_without_proof": drive_without_proof,
+        }
         self._robots: dict[tuple[str, str], str] = {}
 
     def config(self, url: str, robot: FoundRobot) -> RobotConfig:
@@ -153,7 +162,7 @@ class Overrides:
         cameras = named_cameras(config.cameras[:MOST_CAMERAS])
         twist = config.motion.twist
         if twist is not None:
-            known = msgspec.structs.replace(twist, stops_within=self._stops_within)
+            known = msgspec.structs.replace(twist, **self._of_every_base)
             config = config.with_part("twist", known)
         return config.with_part("cameras", cameras)
 

@@ -71,6 +71,8 @@ class LinkUp:
 
     url: str
     lane: Lane
+    only_echoes: bool = False
+    """Whether an answered ping does not prove that earlier messages were handled."""
 
 
 @dataclass(frozen=True, slots=True)

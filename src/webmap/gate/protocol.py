@@ -150,6 +150,8 @@ class RobotSpec(
     own_map: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """The origin of its goal frame on the common map: metres and radians. Goals and
     poses arrive on the common map, and are sent to the robot in its own map."""
+    drive_without_proof: bool = False
+    """Whether it may be moved through a bridge that does not show what has arrived."""
     assist: AssistSpec | None = None
     """The scan assist of the robot; ``None`` is off."""
     stop_hooks: tuple[StopHook, ...] = ()

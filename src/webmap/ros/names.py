@@ -24,7 +24,7 @@ VIDEO = ("foxglove_msgs/CompressedVideo", "ffmpeg_image_transport_msgs/FFMPEGPac
 
 _AGENTS = ("zenoh", "zenohs")
 _FOXGLOVE = {"foxglove": "ws", "foxgloves": "wss"}
-_WITH_GATE = ("ws", "wss", *_AGENTS)
+_WITH_GATE = ("ws", "wss", *_FOXGLOVE, *_AGENTS)
 _MAX_NAME = 255
 _THIS_COMPUTER = ("localhost", "127.0.0.1", "[::1]")
 

@@ -6,7 +6,8 @@ writes no more than :data:`MOST` moving velocities that are not known to have ar
 Two things prove arrival.
 
 - The bridge answers a ping. That proves everything written before the ping, because a
-  bridge processes the messages of one socket in order.
+  bridge processes the messages of one socket in order. With a bridge that answers pings
+  apart from its messages, it proves nothing (``rules/delivery``).
 - The velocity comes back from the robot's ROS (an echo). That proves the oldest
   velocity of this value that has no echo yet, and all before it. But an echo looks the
   same as a velocity from another publisher, and others publish zero as well. So an echo
@@ -21,10 +22,8 @@ from collections.abc import Callable, Mapping
 from webmap.base.geometry import Twist
 from webmap.gate.clock import now
 from webmap.gate.events import EchoReceived, Event, Key, LinkDown, LinkUp, PingAnswered
-from webmap.gate.lanes import rosbridge
-from webmap.gate.lanes.lane import Lane
+from webmap.gate.lanes.wires import wire_to
 from webmap.gate.rules.motion import ZERO
-from webmap.ros.rosbridge import ops
 
 MOST = 6
 """Moving velocities to one topic that may be unconfirmed at once.
@@ -62,8 +61,12 @@ class UnconfirmedWrites:
         """Note that a ping is written at ``now``; the numbers of pings grow."""
         self._pings.append((number, self._written, now))
 
-    def on_pong(self, number: int) -> float:
+    def on_pong(self, number: int, *, proves: bool = True) -> float:
         """Note the answer to a ping, which confirms all that was written before it.
+
+        Args:
+            number: The number of the ping.
+            proves: Whether it confirms anything, see ``rules/delivery``.
 
         Returns:
             When that ping was written.
@@ -72,7 +75,7 @@ class UnconfirmedWrites:
         while self._pings[0][0] < number:
             self._pings.popleft()
         _, written, asked_at = self._pings.popleft()
-        for waiting in self._on_the_way.values():
+        for waiting in self._on_the_way.values() if proves else ():
             _drop(waiting, written)
         return asked_at
 
@@ -128,14 +131,15 @@ class ControlLane:
         """The type that each topic is announced with."""
         self._listened: set[str] = set()
         self._unconfirmed = UnconfirmedWrites()
-        self.lane = Lane(
+        self._wire = wire_to(
             url,
             up=self._open,
-            down=lambda: emit(LinkDown(url, "control")),
+            down=self._lost,
             text=self._on_message,
             pinged=self._ping,
             pong=self._answer,
         )
+        self.lane = self._wire.lane
         self.lane.ping_every(IDLE_PING)
 
     def attach(self, topic: str, type: str, assumed: bool = False) -> None:
@@ -169,16 +173,12 @@ class ControlLane:
         if type == announced:
             return
         if announced is not None:
-            self.lane.release_hold(f"webmap-gate advertise {topic} {announced}")
-            self.lane.release_hold(f"webmap-gate echo {topic} {announced}")
+            self._wire.release(f"webmap-gate advertise {topic} {announced}")
+            self._wire.release(f"webmap-gate echo {topic} {announced}")
             del self._types[topic]
         if type is not None:
-            echo = f"webmap-gate echo {topic} {type}"
-            listen = ops.subscribe(topic, id=echo, type=type, throttle_rate=ECHO)
-            self.lane.hold(echo, listen, ops.unsubscribe(topic, id=echo))
-            id = f"webmap-gate advertise {topic} {type}"
-            hello = ops.advertise(topic, type, id=id)
-            self.lane.hold(id, hello, ops.unadvertise(topic, id=id))
+            self._wire.subscribe(f"webmap-gate echo {topic} {type}", topic, type, ECHO)
+            self._wire.advertise(f"webmap-gate advertise {topic} {type}", topic, type)
             self._types[topic] = type
         self.lane.budget.topics = len(self._types)
 
@@ -211,7 +211,9 @@ class ControlLane:
         type = self._types.get(topic)
         if type is None or not (twist.is_zero or self._unconfirmed.room(topic)):
             return False
-        data = rosbridge.velocity(topic, type, twist, frame)
+        data = self._wire.velocity(topic, type, twist, frame)
+        if data is None:
+            return False
         if twist.is_zero:
             until = math.inf
         done = self.lane.write(data, only_if_clear=not twist.is_zero, until=until)
@@ -221,28 +223,37 @@ class ControlLane:
 
     def write_zeros(self, frames: Mapping[Key, str]) -> list[Key]:
         """Write zeros to machines, given with their frames; return which got one."""
-        known = [key for key in frames if key.topic in self._types]
-        zeros = [
-            rosbridge.velocity(key.topic, self._types[key.topic], ZERO, frames[key])
-            for key in known
-        ]
-        return known if self.lane.write(*zeros, only_if_clear=False) else []
+        zeros: dict[Key, bytes] = {}
+        for key, frame in frames.items():
+            type = self._types.get(key.topic)
+            zero = type and self._wire.velocity(key.topic, type, ZERO, frame)
+            if zero:
+                zeros[key] = zero
+        done = self.lane.write(*zeros.values(), only_if_clear=False)
+        return list(zeros) if done else []
+
+    def _lost(self) -> None:
+        # Here, because the next link may be pinged before the bridge calls it open.
+        self._unconfirmed.begin()  # the bytes in the link are lost
+        self._emit(LinkDown(self._url, "control"))
 
     def _open(self) -> None:
-        self._unconfirmed.begin()  # the bytes in the previous link are lost
-        self._emit(LinkUp(self._url, "control"))
+        self._emit(LinkUp(self._url, "control", self._wire.only_echoes))
 
     def _ping(self, number: int) -> None:
         self._unconfirmed.on_ping(number, now())
 
     def _answer(self, number: int) -> None:
-        self._emit(PingAnswered(self._url, self._unconfirmed.on_pong(number)))
+        proves = not self._wire.only_echoes
+        asked_at = self._unconfirmed.on_pong(number, proves=proves)
+        self._emit(PingAnswered(self._url, asked_at))
 
     def _on_message(self, data: bytes) -> None:
-        message = rosbridge.parse_echo(data)
-        if message is None or message.topic not in self._types or message.twist is None:
+        message = self._wire.read_velocity(data)
+        if message is None:
             return
-        if not message.twist.is_finite:
+        topic, twist = message
+        if topic not in self._types or twist is None or not twist.is_finite:
             return
-        self._unconfirmed.echoed(message.topic, message.twist)
-        self._emit(EchoReceived(Key(self._url, message.topic), message.twist))
+        self._unconfirmed.echoed(topic, twist)
+        self._emit(EchoReceived(Key(self._url, topic), twist))

@@ -6,6 +6,7 @@ import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Required, TypedDict
 
 from webmap.base.errors import BridgeClosed
 from webmap.gate.lanes.budget import Budget
@@ -94,6 +95,16 @@ class Announcement:
     count: int = 1
 
 
+class LaneHandlers(TypedDict, total=False):
+    """The callbacks of a lane, as :class:`Lane` describes them."""
+
+    up: Required[Callable[[], None]]
+    down: Required[Callable[[], None]]
+    text: Required[Callable[[bytes], None]]
+    pinged: Callable[[int], None]
+    pong: Callable[[int], None]
+
+
 class Lane:
     """One WebSocket to a bridge, and the announcements sent whenever it opens.
 
@@ -143,22 +154,39 @@ class Lane:
         """Whether anything is announced, so that the socket has to be open."""
         return bool(self._holds)
 
-    def hold(self, id: str, hello: bytes = b"", goodbye: bytes = b"") -> None:
-        """Hold the lane; ``hello`` is sent now and whenever the lane opens."""
+    @property
+    def subprotocol(self) -> str | None:
+        """The subprotocol of the open socket, if it has one."""
+        return None if self._socket is None else self._socket.subprotocol
+
+    def hold(self, id: str, hello: bytes = b"", goodbye: bytes = b"") -> bool:
+        """Hold the lane; ``hello`` is sent now and whenever the lane opens.
+
+        Returns:
+            Whether the lane was not held under this id before.
+
+        """
         held = self._holds.get(id)
         if held is not None:
             held.count += 1
-            return
+            return False
         self._holds[id] = Announcement(hello, goodbye)
         self._send_announcement(hello)
+        return True
 
-    def release_hold(self, id: str) -> None:
-        """Undo one :meth:`hold`; after the last one ``goodbye`` is sent."""
+    def release_hold(self, id: str) -> bool:
+        """Undo one :meth:`hold`; after the last one ``goodbye`` is sent.
+
+        Returns:
+            Whether it was the last one of this id.
+
+        """
         held = self._holds[id]
         held.count -= 1
         if held.count == 0:
             del self._holds[id]
             self._send_announcement(held.goodbye)
+        return held.count == 0
 
     def write(
         self, *messages: bytes, only_if_clear: bool, until: float = math.inf

@@ -13,10 +13,10 @@ from webmap.gate.events import (
     PoseWritten,
     TwistWritten,
 )
+from webmap.gate.lanes.calls import ServiceCalls
 from webmap.gate.lanes.control import ControlLane
 from webmap.gate.lanes.odometry import OdometryLane
 from webmap.gate.lanes.tasks import (
-    ServiceCalls,
     TasksLane,
     Topic,
     goal_topics,

@@ -146,8 +146,15 @@ def of_topics(data: bytes, spec: RobotSpec, goal: SendGoal) -> GoalNews | None:
     frame = _read(data)
     if frame is None or frame.op != "publish":
         return None
-    part = frame.topic.removeprefix(f"{spec.action}/")
-    message = _as(frame.msg, _ActionlibMessage)
+    return of_message(frame.topic, frame.msg, spec, goal)
+
+
+def of_message(
+    topic: str, fields: Any, spec: RobotSpec, goal: SendGoal
+) -> GoalNews | None:
+    """Return the news of a goal in a message from one of move_base's topics."""
+    part = topic.removeprefix(f"{spec.action}/")
+    message = _as(fields, _ActionlibMessage)
     if message is None or part not in ("status", "feedback", "result"):
         return None
     if part == "status":
@@ -274,19 +281,20 @@ def answer_to(data: bytes, id: str) -> CallResult | None:
     if str(frame.id) != id:
         return None
     if frame.op == "status" and frame.level == "error":
-        return CallResult(_because("refused", frame.msg))
+        return CallResult(because("refused", frame.msg))
     if frame.op != "service_response":
         return None
     if frame.result is False:
-        return CallResult(_because("refused", frame.values))
+        return CallResult(because("refused", frame.values))
     values = frame.values
     if isinstance(values, dict) and values.get("success") is False:
         return CallResult(
-            _because("the service reported a failure", values.get("message"))
+            because("the service reported a failure", values.get("message"))
         )
     return CallResult(None)
 
 
-def _because(what: str, text: Any) -> str:
+def because(what: str, text: Any) -> str:
+    """Return why a call failed, with the words of the bridge or the service."""
     details = readable(text) if isinstance(text, str) else ""
     return f"{what} ({details})" if details else what

@@ -73,9 +73,8 @@ def plain(data: bytes) -> Any:
     return value
 
 
-@lru_cache(maxsize=MOST_KEPT)
-def velocity(topic: str, type: str, twist: Twist, frame: str = "") -> bytes:
-    """Return the operation that publishes a velocity, in the frame of the base.
+def velocity_message(type: str, twist: Twist, frame: str) -> dict[str, Any]:
+    """Return the fields of a velocity, in the frame of the base.
 
     The stamp of a TwistStamped is zero. A base compares the stamp with its own clock: a
     stamp from a clock that is ahead would disable the base's timeout.
@@ -83,24 +82,41 @@ def velocity(topic: str, type: str, twist: Twist, frame: str = "") -> bytes:
     message: dict[str, Any] = twist.to_message()
     if is_type(type, "geometry_msgs/TwistStamped"):
         message = {"header": _header(type, frame), "twist": message}
-    return ops.publish(topic, message)
+    return message
 
 
-def goal(spec: RobotSpec, goal: SendGoal) -> bytes:
-    """Return the operation that sends the robot to a goal."""
+@lru_cache(maxsize=MOST_KEPT)
+def velocity(topic: str, type: str, twist: Twist, frame: str = "") -> bytes:
+    """Return the operation that publishes a velocity, in the frame of the base."""
+    return ops.publish(topic, velocity_message(type, twist, frame))
+
+
+Message = tuple[str, str, dict[str, Any]]
+"""A topic, its type, and the fields of a message."""
+
+GOAL_ID = "actionlib_msgs/GoalID"
+EVERY_GOAL = {"stamp": {"secs": 0, "nsecs": 0}, "id": ""}
+"""The fields of an empty ``GOAL_ID``, which JSON may leave out."""
+
+MOVE_BASE_GOAL = "move_base_msgs/MoveBaseActionGoal"
+
+
+def goal_message(spec: RobotSpec, goal: SendGoal) -> Message:
+    """Return the message that sends the robot to a goal, unless it is an action."""
     if goal.method == "topic":
         topic = spec.goal_topic or ""  # never empty: the rules checked it
-        return ops.publish(topic, _stamped(spec.goal_type, spec, _pose(goal)))
-    if goal.method == "move_base":
-        target = _stamped("geometry_msgs/PoseStamped", spec, _pose(goal))
-        return ops.publish(
-            f"{spec.action}/goal",
-            {
-                "header": _header("", ""),
-                "goal_id": {"stamp": {"secs": 0, "nsecs": 0}, "id": goal.id},
-                "goal": {"target_pose": target},
-            },
-        )
+        return topic, spec.goal_type, _stamped(spec.goal_type, spec, _pose(goal))
+    target = _stamped("geometry_msgs/PoseStamped", spec, _pose(goal))
+    message = {
+        "header": _header("", ""),
+        "goal_id": {"stamp": {"secs": 0, "nsecs": 0}, "id": goal.id},
+        "goal": {"target_pose": target},
+    }
+    return f"{spec.action}/goal", MOVE_BASE_GOAL, message
+
+
+def action_goal(spec: RobotSpec, goal: SendGoal) -> bytes:
+    """Return the operation that sends the robot to a goal of its action."""
     pose = _stamped("geometry_msgs/msg/PoseStamped", spec, _pose(goal))
     return json.dumps(
         {
@@ -115,9 +131,9 @@ def goal(spec: RobotSpec, goal: SendGoal) -> bytes:
     ).encode()
 
 
-def cancel_by_topic(topic: str) -> bytes:
-    """Return the operation that cancels every goal of an actionlib server."""
-    return ops.publish(topic, {})
+def cancel_message(topic: str) -> Message:
+    """Return the message that cancels every goal of an actionlib server."""
+    return topic, GOAL_ID, {}
 
 
 def cancel_by_service(action: str, id: str) -> bytes:
@@ -130,9 +146,9 @@ def cancel_by_service(action: str, id: str) -> bytes:
     )
 
 
-def flag(topic: str, value: bool) -> bytes:
-    """Return the operation that publishes a Bool."""
-    return ops.publish(topic, {"data": value})
+def flag(topic: str, type: str, value: bool) -> Message:
+    """Return the message with a Bool."""
+    return topic, type, {"data": value}
 
 
 def trigger(service: str, type: str, id: str) -> bytes:
@@ -140,13 +156,13 @@ def trigger(service: str, type: str, id: str) -> bytes:
     return ops.call_service(service, {}, id=id, type=type)
 
 
-def pose_estimate(spec: RobotSpec, at: SendPose) -> bytes:
-    """Return the operation that sends the robot its pose."""
+def pose_estimate(spec: RobotSpec, at: SendPose) -> Message:
+    """Return the message that sends the robot its pose."""
     covariance = [0.0] * 36
     covariance[0], covariance[7], covariance[35] = spec.pose_covariance
     pose = {"pose": _pose(at), "covariance": covariance}
-    message = _stamped(spec.pose_type, spec, pose)
-    return ops.publish(spec.pose_topic or "", message)
+    topic = spec.pose_topic or ""  # never empty: the rules checked it
+    return topic, spec.pose_type, _stamped(spec.pose_type, spec, pose)
 
 
 def _pose(at: SendGoal | SendPose) -> dict[str, Any]:

@@ -23,12 +23,15 @@ from websockets.exceptions import WebSocketException
 from websockets.frames import Frame, Opcode
 from websockets.http11 import Response
 from websockets.protocol import State
+from websockets.typing import Subprotocol
 from websockets.uri import parse_uri
 
 from webmap.base.errors import BridgeClosed, ProtocolError
 from webmap.gate.clock import now
 from webmap.gate.lanes.budget import Budget
 from webmap.gate.lanes.navigation import readable
+from webmap.ros.foxglove.protocol import SUBPROTOCOLS
+from webmap.ros.names import is_foxglove_url, web_socket_url
 from webmap.ros.rosbridge.pieces import Pieces
 from webmap.ros.sockets.turns import Turn, turns
 
@@ -40,12 +43,17 @@ CONNECT_TIMEOUT = 3.0
 MAX_FRAME = 1 << 20
 """The longest message that is accepted from a bridge, in bytes."""
 
+MAX_OFFER = 4 << 20
+"""The same for Foxglove, whose first message has all topics with their definitions."""
+
 MAX_PARTS = 4096
 """The most frames in one message. Bridges send one, some proxies a few."""
 
 MAX_WAITING = 1 << 16
 """With more bytes than this waiting for their turn, no more are read. As many are read
 at once: for 256 KiB, as asyncio has it, the system gets new memory for each message."""
+
+_OFFERED = [Subprotocol(name) for name in SUBPROTOCOLS]
 
 # "Linger 0": the kernel drops unsent bytes on close and resets the connection.
 _LINGER = struct.pack("hh" if sys.platform == "win32" else "ii", 1, 0)
@@ -88,7 +96,12 @@ class Socket(asyncio.Protocol):
         self._ended: str | None = None
         """Why nothing more will be received, once that is known."""
         self.opened: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        self._protocol = ClientProtocol(parse_uri(url), max_size=MAX_FRAME)
+        self._is_foxglove = is_foxglove_url(url)
+        self._protocol = ClientProtocol(
+            parse_uri(web_socket_url(url)),
+            max_size=MAX_OFFER if self._is_foxglove else MAX_FRAME,
+            subprotocols=_OFFERED if self._is_foxglove else None,
+        )
         self._transport: asyncio.Transport | None = None
         self._parts: list[bytes] = []
         self._over = False
@@ -100,12 +113,17 @@ class Socket(asyncio.Protocol):
         return open and self._protocol.state is State.OPEN
 
     @property
+    def subprotocol(self) -> str | None:
+        """The subprotocol that the bridge has chosen, if it was offered any."""
+        return self._protocol.subprotocol
+
+    @property
     def unsent(self) -> int:
         """Written bytes that the kernel has not accepted yet."""
         return 0 if self._transport is None else self._transport.get_write_buffer_size()
 
     def send(self, *messages: bytes, until: float = math.inf) -> bool:
-        """Write text messages, unless they are too old; return whether it was done.
+        """Write messages, unless they are too old; return whether it was done.
 
         The clock is read at the last moment. Otherwise a process that was stopped
         (SIGSTOP, a laptop that sleeps) would first write a velocity that was decided
@@ -117,7 +135,10 @@ class Socket(asyncio.Protocol):
 
         """
         for data in messages:
-            self._protocol.send_text(data)
+            if data[:1] < b" ":  # the opcode of a binary message of Foxglove
+                self._protocol.send_binary(data)
+            else:
+                self._protocol.send_text(data)
         return self._flush(until)
 
     def ping(self, data: bytes) -> None:
@@ -159,6 +180,8 @@ class Socket(asyncio.Protocol):
     def data_received(self, data: bytes) -> None:
         """Keep the bytes until the link has its turn."""
         self._waiting += data
+        if self._is_foxglove:
+            self._answer_quickly()
         if len(self._waiting) > MAX_WAITING:
             self._read_on(False)
         self._turns.ask(self)
@@ -271,7 +294,9 @@ class Socket(asyncio.Protocol):
             self._transport.close()
 
     def _finish_handshake(self) -> None:
-        if self._protocol.handshake_exc is None and not self.opened.done():
+        if self._is_foxglove and self._protocol.subprotocol is None:
+            self.abort("no bridge of Foxglove at this address")
+        elif self._protocol.handshake_exc is None and not self.opened.done():
             self.opened.set_result(None)
 
     def _on_frame(self, frame: Frame) -> None:
@@ -292,6 +317,16 @@ class Socket(asyncio.Protocol):
             if not self._complained:
                 self._complained = True
                 log.warning("%s: %s; ignored, as are similar messages", self.url, error)
+
+    def _answer_quickly(self) -> None:
+        """Acknowledge data at once: servers of Foxglove keep back a small message.
+
+        They do so until the message before it is acknowledged, for up to 40 ms.
+        """
+        assert self._transport is not None
+        raw = self._transport.get_extra_info("socket")
+        with contextlib.suppress(OSError, AttributeError):  # only Linux has it
+            raw.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
 
     def _flush(self, until: float = math.inf) -> bool:
         """Write what the protocol has to send, unless that is too old."""
@@ -326,7 +361,7 @@ async def open_socket(url: str, handlers: SocketHandlers, budget: Budget) -> Soc
         BridgeClosed: If no connection is made in time.
 
     """
-    uri = parse_uri(url)
+    uri = parse_uri(web_socket_url(url))
     made = Socket(url, handlers, budget)
     try:
         async with asyncio.timeout(CONNECT_TIMEOUT):

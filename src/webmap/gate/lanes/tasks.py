@@ -16,21 +16,15 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import TypeVar
 
-from websockets.exceptions import WebSocketException
-
-from webmap.base.errors import BridgeClosed
 from webmap.base.geometry import Pose
-from webmap.base.identifiers import generate_id
 from webmap.gate.actions import SendGoal, SendPose
 from webmap.gate.events import Event, GoalEnded, GoalLost, LinkDown, LinkUp
 from webmap.gate.lanes import navigation, rosbridge
-from webmap.gate.lanes.budget import Budget
-from webmap.gate.lanes.lane import Lane
-from webmap.gate.lanes.navigation import answer_to, readable
-from webmap.gate.lanes.sockets import Socket, SocketHandlers, open_socket
+from webmap.gate.lanes.calls import Ended, ServiceCalls
+from webmap.gate.lanes.sockets import Socket, SocketHandlers
+from webmap.gate.lanes.wires import wire_to
 from webmap.gate.protocol import RobotSpec, StopHook
 from webmap.gate.rules.goals import is_move_base
-from webmap.ros.rosbridge import ops
 
 Place = TypeVar("Place", SendGoal, SendPose)
 
@@ -53,95 +47,11 @@ def in_own_map(spec: RobotSpec, at: Place) -> Place:
 
 log = logging.getLogger("webmap.gate")
 
-CALL_TIMEOUT = 2.0
-"""The longest time for a service call, in seconds, including the connection."""
-
-Ended = Callable[[str | None], None]
-"""Called with the reason of a failure, or with ``None`` after a success."""
-
-
-class ServiceCalls:
-    """Calls services of one bridge and keeps track of the calls.
-
-    Args:
-        url: The bridge's address.
-
-    """
-
-    def __init__(self, url: str) -> None:
-        self._url = url
-        self._budget = Budget()
-        self._calling: set[asyncio.Task[None]] = set()
-
-    def call(
-        self, request: bytes, id: str, what: str, ended: Ended = lambda why: None
-    ) -> None:
-        """Call a service without waiting for its answer.
-
-        Args:
-            request: The operation that calls it.
-            id: The id of the call, which the answer repeats.
-            what: The purpose of the call, for the log.
-            ended: Called with the outcome, unless :meth:`close` cancels the call.
-
-        """
-        call = self._call(request, id, what, ended)
-        task = asyncio.get_running_loop().create_task(call)
-        self._calling.add(task)
-        task.add_done_callback(self._calling.discard)
-
-    async def settle(self) -> None:
-        """Wait until every call has ended."""
-        if self._calling:
-            await asyncio.wait(self._calling)
-
-    def close(self) -> None:
-        """Cancel the unanswered calls."""
-        for task in self._calling:
-            task.cancel()
-
-    async def _call(self, request: bytes, id: str, what: str, ended: Ended) -> None:
-        why = await self._ask(request, id)
-        if why is not None:
-            log.warning("%s: %s", what, why)
-        ended(why)
-
-    async def _ask(self, request: bytes, id: str) -> str | None:
-        """Call a service; return why that failed, ``None`` if it did not."""
-        outcomes: asyncio.Queue[str | None] = asyncio.Queue()
-
-        def on_text(data: bytes) -> None:
-            answer = answer_to(data, id)
-            if answer is not None:
-                outcomes.put_nowait(answer.why)
-
-        def lost(why: str) -> None:
-            reason = readable(f"no answer: connection lost: {why}")
-            outcomes.put_nowait(reason)
-
-        handlers = SocketHandlers(text=on_text, pong=lambda _: None, lost=lost)
-        try:
-            async with asyncio.timeout(CALL_TIMEOUT):
-                link = await open_socket(self._url, handlers, self._budget)
-                try:
-                    link.send(request)
-                    return await outcomes.get()
-                finally:
-                    link.close()
-        # WebSocketException: the bridge closed the link as soon as it was open.
-        except (BridgeClosed, WebSocketException) as error:
-            return readable(f"no connection: {error}")
-        except TimeoutError:
-            return f"no answer within {CALL_TIMEOUT:g} s"
-
-
 MAX_SPENT = 8
 """The most sockets of action goals that are kept for their results."""
 
 FEEDBACK_PERIOD = 0.2
 """The least time between two progress events of a goal, in seconds."""
-
-GOAL_ID = "actionlib_msgs/GoalID"
 
 _ACTIONLIB = {
     "status": ("actionlib_msgs/GoalStatusArray", 200),
@@ -175,24 +85,23 @@ class TasksLane:
         self._followed: dict[str, tuple[RobotSpec, SendGoal]] = {}
         """The goals of move_base that are under way, by robot."""
         self._spending = False
-        self.lane = Lane(
+        self._wire = wire_to(
             url,
-            up=lambda: emit(LinkUp(url, "tasks")),
+            up=lambda: emit(LinkUp(url, "tasks", self._wire.only_echoes)),
             down=self._down,
             text=self._on_message,
         )
+        self.lane = self._wire.lane
 
     def attach(self, topics: Iterable[Topic]) -> None:
         """Announce topics that a robot needs on this lane."""
         for topic, type in topics:
-            id = _advertisement(topic, type)
-            hello = ops.advertise(topic, type, id=id)
-            self.lane.hold(id, hello, ops.unadvertise(topic, id=id))
+            self._wire.advertise(_advertisement(topic, type), topic, type)
 
     def detach(self, topics: Iterable[Topic]) -> None:
         """Undo one :meth:`attach`."""
         for topic, type in topics:
-            self.lane.release_hold(_advertisement(topic, type))
+            self._wire.release(_advertisement(topic, type))
 
     def send(self, spec: RobotSpec, goal: SendGoal) -> bool:
         """Write a goal now or drop it; return whether it was written."""
@@ -200,10 +109,13 @@ class TasksLane:
         if goal.method == "move_base":
             # First, to miss no message: they may come at once.
             self._follow(spec, goal)
-        data = rosbridge.goal(spec, goal)
-        done = self.lane.write(data, only_if_clear=True, until=goal.until)
-        if done and goal.method == "navigate_to_pose":
-            self._keep_for_result(goal)
+        if goal.method == "navigate_to_pose":
+            data = rosbridge.action_goal(spec, goal)
+            done = self.lane.write(data, only_if_clear=True, until=goal.until)
+            if done:
+                self._keep_for_result(goal)
+        else:
+            done = self._publish(rosbridge.goal_message(spec, goal), until=goal.until)
         if not done:
             self.forget(goal.robot)
         return done
@@ -211,21 +123,19 @@ class TasksLane:
     def send_pose(self, spec: RobotSpec, at: SendPose) -> bool:
         """Write the robot's pose now or drop it; return whether it was written."""
         estimate = rosbridge.pose_estimate(spec, in_own_map(spec, at))
-        return self.lane.write(estimate, only_if_clear=True, until=at.until)
+        return self._publish(estimate, until=at.until)
 
     def cancel(self, spec: RobotSpec) -> None:
         """Cancel every goal of the robot, by every method that it has."""
         if spec.cancel_topic is not None:
-            self.lane.write(
-                rosbridge.cancel_by_topic(spec.cancel_topic), only_if_clear=False
-            )
+            self._publish(rosbridge.cancel_message(spec.cancel_topic))
         if spec.action is not None and is_move_base(spec):
             topic = f"{spec.action}/cancel"
             if topic != spec.cancel_topic:
-                self.lane.write(rosbridge.cancel_by_topic(topic), only_if_clear=False)
+                self._publish(rosbridge.cancel_message(topic))
         elif spec.action is not None:
-            id, what = generate_id(), f"cancelling the goals of {spec.action}"
-            self._calls.call(rosbridge.cancel_by_service(spec.action, id), id, what)
+            what = f"cancelling the goals of {spec.action}"
+            self._calls.call(self._wire.cancel_call(spec.action), what)
 
     def run_hook(self, hook: StopHook, stopped: bool, ended: Ended) -> None:
         """Publish the Bool of a stop hook, or call its service.
@@ -238,10 +148,9 @@ class TasksLane:
 
         """
         if hook.service:
-            id = generate_id()
-            request = rosbridge.trigger(hook.service, hook.type, id)
-            self._calls.call(request, id, f"stop hook {hook.service}", ended)
-        elif self.lane.write(rosbridge.flag(hook.topic, stopped), only_if_clear=False):
+            call = self._wire.trigger_call(hook.service, hook.type)
+            self._calls.call(call, f"stop hook {hook.service}", ended)
+        elif self._publish(rosbridge.flag(hook.topic, hook.type, stopped)):
             ended(None)
         else:
             why = "not sent: no connection"
@@ -254,6 +163,21 @@ class TasksLane:
         for link in self._spent:
             link.close()
         self._spent.clear()
+
+    def _publish(self, message: rosbridge.Message, until: float | None = None) -> bool:
+        """Write a message now or drop it; return whether it was written.
+
+        Args:
+            message: The message.
+            until: When it is too old; without this it may wait behind other data.
+
+        """
+        data = self._wire.message(*message)
+        if data is None:
+            return False
+        if until is None:
+            return self.lane.write(data, only_if_clear=False)
+        return self.lane.write(data, only_if_clear=True, until=until)
 
     def _keep_for_result(self, goal: SendGoal) -> None:
         throttle = FeedbackThrottle()
@@ -292,8 +216,7 @@ class TasksLane:
         for part, (type, throttle) in _ACTIONLIB.items():
             topic = f"{spec.action}/{part}"
             id = f"webmap-gate follow {topic} {goal.robot}"
-            hello = ops.subscribe(topic, type=type, id=id, throttle_rate=throttle)
-            self.lane.hold(id, hello, ops.unsubscribe(topic, id=id))
+            self._wire.subscribe(id, topic, type, throttle)
 
     def forget(self, robot: str) -> None:
         """Stop following a robot's goal of move_base."""
@@ -301,11 +224,11 @@ class TasksLane:
         if found is not None:
             for part in _ACTIONLIB:
                 topic = f"{found[0].action}/{part}"
-                self.lane.release_hold(f"webmap-gate follow {topic} {robot}")
+                self._wire.release(f"webmap-gate follow {topic} {robot}")
 
     def _on_message(self, data: bytes) -> None:
         for robot, (spec, goal) in list(self._followed.items()):
-            news = navigation.of_topics(data, spec, goal)
+            news = self._wire.read_news(data, spec, goal)
             if isinstance(news, GoalEnded):
                 self.forget(robot)
             if news is not None:
@@ -346,11 +269,11 @@ def goal_topics(spec: RobotSpec) -> list[Topic]:
     if spec.goal_topic is not None:
         topics.append((spec.goal_topic, spec.goal_type))
     if spec.cancel_topic is not None:
-        topics.append((spec.cancel_topic, GOAL_ID))
+        topics.append((spec.cancel_topic, rosbridge.GOAL_ID))
     if spec.action is not None and is_move_base(spec):
-        topics.append((f"{spec.action}/goal", "move_base_msgs/MoveBaseActionGoal"))
+        topics.append((f"{spec.action}/goal", rosbridge.MOVE_BASE_GOAL))
         if spec.cancel_topic != f"{spec.action}/cancel":
-            topics.append((f"{spec.action}/cancel", GOAL_ID))
+            topics.append((f"{spec.action}/cancel", rosbridge.GOAL_ID))
     if spec.pose_topic is not None:
         topics.append((spec.pose_topic, spec.pose_type))
     return topics

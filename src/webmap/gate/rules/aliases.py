@@ -106,6 +106,7 @@ _terms = attrgetter(
     "odometry_topic",
     "assist",
     "stop_hooks",
+    "drive_without_proof",
 )
 """The part of a robot's declaration that applies to the whole machine."""
 
@@ -174,6 +175,11 @@ class Aliases:
         stated = [spec.stops_within for spec in self.specs.values()]
         known = [seconds for seconds in stated if seconds is not None]
         return max(known) if len(known) == len(stated) else None
+
+    @property
+    def drive_without_proof(self) -> bool:
+        """Whether every robot accepts that nothing but echoes shows what arrived."""
+        return all(spec.drive_without_proof for spec in self.specs.values())
 
     @property
     def follow_goals(self) -> bool:

@@ -18,9 +18,9 @@ from webmap.gate.events import Key, LockState
 from webmap.gate.limits import Cap, page_cap
 from webmap.gate.rules.aliases import Aliases
 from webmap.gate.rules.connections import Connection, Epochs, Lease
+from webmap.gate.rules.delivery import Delivery, without_proof
 from webmap.gate.rules.health import (
     DisplayPulse,
-    LinkHealth,
     Observation,
     Standstill,
     Video,
@@ -28,6 +28,13 @@ from webmap.gate.rules.health import (
 from webmap.gate.rules.motion import DeadMan, Motion
 from webmap.gate.rules.speeds import MachineSpeeds
 from webmap.gate.rules.stop import StopLatch
+from webmap.ros.names import is_foxglove_url
+
+NO_TIMEOUT = (
+    "behind Foxglove a robot is driven only if its base stops by itself: state "
+    "stops_within, or run the stop test"
+)
+"""Why a robot is not driven whose command timeout is not known."""
 
 
 class MotionConditions:
@@ -37,7 +44,8 @@ class MotionConditions:
         key: The machine.
         robots: The robots of the machine.
         latch: The machine's STOP.
-        control: The link that carries velocities.
+        control: Whether its velocities arrive.
+        speeds: What is known of its speed and its command timeout.
         pulse: Whether the display is alive.
         observation: The newest odometry and echo of the machine.
 
@@ -48,7 +56,8 @@ class MotionConditions:
         key: Key,
         robots: Aliases,
         latch: StopLatch,
-        control: LinkHealth,
+        control: Delivery,
+        speeds: MachineSpeeds,
         pulse: DisplayPulse,
         observation: Observation,
     ) -> None:
@@ -59,6 +68,7 @@ class MotionConditions:
         self._robots = robots
         self._latch = latch
         self._control = control
+        self._speeds = speeds
         self._display_pulse = pulse
         self._observation = observation
 
@@ -76,7 +86,11 @@ class MotionConditions:
         if fault := self._display_pulse.fault(now):
             return fault
         if self._robots.drivable:
-            return None if self._control.up else f"no connection to {self._url}"
+            if not self._control.up:
+                return f"no connection to {self._url}"
+            if self._control.only_echoes and not self._robots.drive_without_proof:
+                return without_proof(self._url)
+            return None
         goals = self._robots.goals[self._robots.newest.id]
         if not goals.can_send:
             return "the robot has no velocity topic and no goal topic"
@@ -88,11 +102,27 @@ class MotionConditions:
             return reason
         if not self._robots.drivable:
             return "the robot has no velocity topic"
-        if not self._control.fresh(now):
-            return f"no answer from {self._url}"
+        if fault := self._control.fault(now):
+            return fault
         if self._robots.has_odometry and (fault := self._observation.fault(now)):
             return fault
         return self.video.fault(now)
+
+    def why_not_driven(self, now: float) -> str | None:
+        """Return why the machine must not be driven, except in a stop test.
+
+        Behind a bridge of Foxglove, a call of any client may hold back all zeros.
+        """
+        if reason := self.why_blocked(now):
+            return reason
+        if is_foxglove_url(self._url) and self._speeds.stop_time is None:
+            return NO_TIMEOUT
+        return None
+
+    @property
+    def needs_echo(self) -> bool:
+        """Whether zeros must show first that velocities come back."""
+        return self._control.needs_echo
 
 
 REQUEST_TIMEOUT = 10.0
@@ -239,6 +269,8 @@ class Authority:
         self.deadman = DeadMan(needs_neutral=not to.program)
         self.renew(now)
         self._new_driver(to.cap, now)
+        if self._robots.drivable and self._conditions.needs_echo:
+            self._motion.zero(now)
         return epoch
 
     def rename(self, who: Connection) -> None:

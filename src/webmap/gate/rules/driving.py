@@ -63,6 +63,9 @@ class Driving:
         if neutral or not self._authority.deadman.armed:
             self._motion.halt(now)
             return None if neutral else "release all inputs first"
+        if reason := self._conditions.why_not_driven(now):
+            self._motion.halt(now)
+            return reason
         self._drive(wanted, lease, now)
         return None
 

@@ -7,9 +7,10 @@ from webmap.gate.actions import CancelGoals, Emit, SendGoal, SendPose
 from webmap.gate.commands import Refusal
 from webmap.gate.events import GoalEnded, GoalLost, GoalProgress, GoalWritten, Key
 from webmap.gate.protocol import GoalMethod, GoalReport, RobotSpec
+from webmap.gate.rules.delivery import without_proof
 from webmap.gate.rules.health import LinkHealth
 from webmap.gate.rules.motion import WAIT_LIMIT
-from webmap.ros.names import is_type
+from webmap.ros.names import is_foxglove_url, is_type
 
 MOVE_BASE = "move_base_msgs/MoveBaseAction"
 """The action type of ROS 1."""
@@ -79,9 +80,19 @@ class Goals:
     def method(self) -> GoalMethod | None:
         """The method for goals of this robot; ``None`` if goals cannot be sent."""
         spec = self.spec
-        if spec.action is None or (self._no_actions and spec.goal_topic is not None):
+        if spec.action is not None and is_move_base(spec):
+            return "move_base"
+        if spec.action is None or self._sends_no_actions:
             return None if spec.goal_topic is None else "topic"
-        return "move_base" if is_move_base(spec) else "navigate_to_pose"
+        return "navigate_to_pose"
+
+    @property
+    def _sends_no_actions(self) -> bool:
+        """Whether goals are not sent to the action of ROS 2 but to a topic, if any."""
+        spec = self.spec
+        if is_foxglove_url(spec.goal_url or spec.bridge_url):
+            return True
+        return self._no_actions and spec.goal_topic is not None
 
     @property
     def can_send(self) -> bool:
@@ -140,9 +151,15 @@ class Goals:
         """
         method = self.method
         if method is None:
+            if self.spec.action is not None:
+                raise Refusal(
+                    "goals are not sent to an action through Foxglove: set a goal topic"
+                )
             raise Refusal("no goal topic and no action is set")
         if not self.link.up:
             raise Refusal("no connection to the bridge that takes goals")
+        if self.link.only_echoes and not self.spec.drive_without_proof:
+            raise Refusal(without_proof(self.spec.goal_url or self.spec.bridge_url))
         id, until = generate_id(), now + WAIT_LIMIT
         self._emit(SendGoal(self._key, self.spec.id, id, x, y, yaw, by, method, until))
 

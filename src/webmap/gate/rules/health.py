@@ -65,14 +65,16 @@ class LinkHealth:
     def __init__(self) -> None:
         self.up = False
         self.trips = Ages()
-        """The round trips of the pings, in seconds."""
+        """The round trips of the pings, or of the velocities, in seconds."""
         self.answered_at = float("-inf")
         """When the newest answer came, or the link was opened."""
+        self.only_echoes = False
+        """Whether an answer proves only that the connection works, see ``delivery``."""
         self._ping_at = float("-inf")
 
-    def opened(self, now: float) -> None:
+    def opened(self, now: float, *, only_echoes: bool = False) -> None:
         """Note that the link is up; none of its pings is answered yet."""
-        self.up = True
+        self.up, self.only_echoes = True, only_echoes
         self._ping_at, self.answered_at = float("-inf"), now
         self.trips.clear()
 
@@ -84,7 +86,8 @@ class LinkHealth:
         """Note that the ping of ``asked_at`` was answered at ``now``."""
         self._ping_at = max(self._ping_at, asked_at)
         self.answered_at = now
-        self.trips.add(now - asked_at, now)
+        if not self.only_echoes:
+            self.trips.add(now - asked_at, now)
 
     def answered_since(self, then: float) -> bool:
         """Return whether a ping sent after ``then`` was answered.

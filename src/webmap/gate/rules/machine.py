@@ -30,6 +30,7 @@ from webmap.gate.rules.assist import ScanAssist
 from webmap.gate.rules.authority import Authority, MotionConditions
 from webmap.gate.rules.check import PreDriveCheck
 from webmap.gate.rules.connections import Epochs
+from webmap.gate.rules.delivery import Delivery
 from webmap.gate.rules.driving import Driving
 from webmap.gate.rules.health import DisplayPulse, LinkHealth, Observation
 from webmap.gate.rules.motion import HELD_PERIOD, Motion
@@ -80,15 +81,22 @@ class Machine:
         self.check = PreDriveCheck(key, self.robots, emit)
         self.speeds = MachineSpeeds(self.robots, control, self.check)
         self.scan_assist = ScanAssist(self.robots)
+        self.delivery = Delivery(key, control)
         self.motion = Motion(
-            key, control, self.speeds.bounds, self.scan_assist.limit, emit
+            key, self.delivery, self.speeds.bounds, self.scan_assist.limit, emit
         )
         self.observation = Observation(key, emit)
         self.obedience = Obedience()
         self.other_writer = OtherWriter()
         self.tests = StopTests(key, self.motion, self.observation, control.trips, emit)
         self.conditions = MotionConditions(
-            key, self.robots, latch, control, pulse, self.observation
+            key,
+            self.robots,
+            latch,
+            self.delivery,
+            self.speeds,
+            pulse,
+            self.observation,
         )
         self.authority = Authority(
             self.robots,
@@ -106,7 +114,9 @@ class Machine:
             self.motion,
             self.tests,
         )
-        self.active_stop = ActiveStop(key, latch, self.robots, control, self.motion)
+        self.active_stop = ActiveStop(
+            key, latch, self.robots, self.delivery, self.motion
+        )
         self._emit = emit
         self._left_at = float("-inf")
         self.reported: tuple[object, ...] | None = None
@@ -298,6 +308,7 @@ class Machine:
         self.motion.on_written(write, now)
         self.tests.on_written(write.twist)
         self.other_writer.on_written(write.twist, now)
+        self.delivery.on_written(write.twist, now)
         vx, vy, wz, *others = write.twist.numbers
         for robot in self.robots.specs:
             self._emit(SendToDisplay(SentTwist(robot, vx, vy, wz, write.by, *others)))
@@ -305,6 +316,7 @@ class Machine:
     def on_echo(self, twist: Twist, now: float) -> None:
         """Note a velocity received on the topic, of this gate or another writer."""
         self.observation.on_echo(twist)
+        self.delivery.on_echo(twist, now)
         self.tests.on_echo(twist, now)
         if self.conditions.lock.elsewhere or self.robots.follow_goals:
             # Another gate on this computer, or the navigation of a goal, writes too.
@@ -354,6 +366,7 @@ class Machine:
         """Send an owed zero first, then an active STOP: the control link is open."""
         if not self.control.up:
             return
+        self.delivery.opened()
         # Velocities of an earlier gate or an earlier link may still arrive as echoes.
         self.other_writer.expect(now + EXPECTED_FOR)
         if self.motion.owes_zero:

@@ -202,6 +202,8 @@ class Machines:
             stop = machine.active_stop.confirmation
             before = machine.rests, stop.confirmed
             machine.step(now)
+            if machine.delivery.stalled(now):
+                self._cut(machine.key.url, now)
             machine.due_at = math.inf
             calm = machine.rests and before == (True, stop.confirmed)
             is_old = machine.reported_at <= early
@@ -236,10 +238,13 @@ class Machines:
         self._oldest_answer = now
         for (url, lane), link in self._links.items():
             if lane == "control" and link.stalled(now):
-                self._emit(CutLink(url))
-                self._link_down(events.LinkDown(url, lane), now)
+                self._cut(url, now)
             elif lane == "control" and link.up:
                 self._oldest_answer = min(self._oldest_answer, link.answered_at)
+
+    def _cut(self, url: str, now: float) -> None:
+        self._emit(CutLink(url))
+        self._link_down(events.LinkDown(url, "control"), now)
 
     def report(self, now: float) -> None:
         """Send a report on each robot whose machine may have changed."""
@@ -389,7 +394,7 @@ class Machines:
 
     def _link_up(self, event: events.LinkUp, now: float) -> None:
         link = self._link(event.url, event.lane)
-        link.opened(now)
+        link.opened(now, only_echoes=event.only_echoes)
         for machine in self._at(event.url):
             if machine.control is link:
                 machine.link_up(now)

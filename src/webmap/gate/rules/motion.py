@@ -12,7 +12,7 @@ from webmap.gate.actions import Emit, MarkDriven, WriteTwist
 from webmap.gate.events import Key, TwistWritten
 from webmap.gate.limits import PLANE, Axes, Speed, fit, ramp
 from webmap.gate.rules.connections import Lease
-from webmap.gate.rules.health import LinkHealth
+from webmap.gate.rules.delivery import Delivery
 
 PERIOD = 0.05
 """Seconds between two zeros."""
@@ -193,7 +193,7 @@ class Motion:
 
     Args:
         key: The machine.
-        control: The link that carries them.
+        control: Whether they arrive.
         bounds: Returns the limits that apply now.
         guard: Limits a velocity that is about to be written by the scans.
         emit: Called with each action.
@@ -203,7 +203,7 @@ class Motion:
     def __init__(
         self,
         key: Key,
-        control: LinkHealth,
+        control: Delivery,
         bounds: Callable[[], MotionLimits],
         guard: Callable[[Twist, float], Twist],
         emit: Emit,
@@ -317,7 +317,7 @@ class Motion:
         self._write_zero_if_due(now)
         answered = self._control.answered_since(self._burst.started_at)
         if self.owes_zero and self.silent and answered:
-            # Only an answer to a ping sent after the zero shows that it has arrived.
+            # Only what answers since the zero shows that it has arrived.
             self.owes_zero = False
             self._emit(MarkDriven(self._key, False))
 

@@ -128,7 +128,7 @@ def _reason(machine: Machine, now: float) -> str | None:
     """Return why the machine cannot be driven now, or ``None``."""
     if machine.authority.lease is None:
         return machine.authority.why_unavailable(now)
-    return machine.conditions.why_blocked(now)
+    return machine.conditions.why_not_driven(now)
 
 
 def _link(machine: Machine, spec: RobotSpec) -> LinkHealth:

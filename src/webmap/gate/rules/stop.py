@@ -21,6 +21,7 @@ from webmap.gate.commands import Refusal
 from webmap.gate.events import Key, Press, StopSaved
 from webmap.gate.protocol import Identity
 from webmap.gate.rules.aliases import Aliases
+from webmap.gate.rules.delivery import Delivery
 from webmap.gate.rules.health import (
     GAP,
     STILL_FOR,
@@ -253,7 +254,7 @@ class ActiveStop:
         key: The machine.
         latch: Whether STOP is active.
         robots: The robots that are declared for the machine.
-        control: The link for velocities.
+        control: Whether its velocities arrive.
         motion: Writes the zeros.
 
     """
@@ -263,7 +264,7 @@ class ActiveStop:
         key: Key,
         latch: StopLatch,
         robots: Aliases,
-        control: LinkHealth,
+        control: Delivery,
         motion: Motion,
     ) -> None:
         self.latch = latch
@@ -376,7 +377,7 @@ class ActiveStop:
     def _why_unobservable(self, drivable: bool) -> str | None:
         """Return why standstill cannot be observed, as text, or ``None``."""
         robots = self._robots
-        link = self._control if drivable else robots.goals[robots.newest.id].link
-        if not link.up:
+        goals = robots.goals[robots.newest.id]
+        if not (self._control.up if drivable else goals.link.up):
             return f"no connection to {self._url}"
         return None if robots.has_odometry else "no odometry"
