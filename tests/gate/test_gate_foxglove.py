@@ -32,6 +32,7 @@ from webmap.gate.lanes.calls import ServiceCalls
 from webmap.gate.lanes.control import MOST, ControlLane
 from webmap.gate.lanes.odometry import OdometryLane
 from webmap.gate.lanes.tasks import TasksLane, goal_topics, hook_topics
+from webmap.gate.protocol import StopHook
 from webmap.ros.names import web_socket_url
 
 SDK, OLD = "foxglove.sdk.v1", "foxglove.websocket.v1"
@@ -426,8 +427,8 @@ class TestOdometry:
                 noting.lane.unwatch_scan("/scan", key)
 
 
-LOCK = {"topic": "/lock", "type": "std_msgs/Bool"}
-E_STOP = {"service": "/e_stop", "type": "std_srvs/Trigger"}
+LOCK = StopHook(topic="/lock", type="std_msgs/Bool")
+E_STOP = StopHook(service="/e_stop", type="std_srvs/Trigger")
 
 
 class Tasks(Noting):
