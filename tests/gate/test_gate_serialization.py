@@ -106,17 +106,17 @@ class TestVelocity:
     @pytest.mark.parametrize("type", WITH_TWIST)
     def test_the_velocity_of_each_type_is_read(self, encoding, type):
         data = b"head" + written(encoding, make(encoding, type, **WITH_TWIST[type]))
-        assert serialization.velocity_in(type, data, 4, encoding) == TWIST
+        assert serialization.velocity_in(data, 4, type, encoding) == TWIST
         with pytest.raises(ProtocolError, match="too short"):
-            serialization.velocity_in(type, data[:50], 4, encoding)
+            serialization.velocity_in(data[:50], 4, type, encoding)
 
     def test_another_type_has_no_velocity(self, encoding):
-        assert serialization.velocity_in("std_msgs/Bool", b"", 0, encoding) is None
+        assert serialization.velocity_in(b"", 0, "std_msgs/Bool", encoding) is None
 
     def test_a_velocity_that_is_not_finite_is_none(self, encoding):
         message = make(encoding, "geometry_msgs/Twist", linear={"x": math.nan})
         data = written(encoding, message)
-        found = serialization.velocity_in("geometry_msgs/Twist", data, 0, encoding)
+        found = serialization.velocity_in(data, 0, "geometry_msgs/Twist", encoding)
         assert found is None
 
     @pytest.mark.parametrize("frame", ["", "b", "base", "base_link"])
@@ -124,7 +124,7 @@ class TestVelocity:
     def test_a_velocity_is_written(self, encoding, type, frame):
         name = f"geometry_msgs/{type}"
         data = velocity(name, TWIST, frame, encoding)
-        assert serialization.velocity_in(name, data, 0, encoding) == TWIST
+        assert serialization.velocity_in(data, 0, name, encoding) == TWIST
         message = read(encoding, name, data)
         if type == "TwistStamped":
             assert message.header.frame_id == frame
@@ -139,15 +139,15 @@ class TestVelocity:
 
 def test_both_byte_orders_are_read_and_other_forms_are_refused():
     data = b"\0\0\0\0" + struct.pack(">6d", 0.5, 0.25, 0.125, 2.0, 3.0, -1.0)
-    assert serialization.velocity_in("geometry_msgs/Twist", data, 0, "cdr") == TWIST
+    assert serialization.velocity_in(data, 0, "geometry_msgs/Twist", "cdr") == TWIST
     with pytest.raises(ProtocolError, match="another form"):
-        serialization.velocity_in("geometry_msgs/Twist", b"\0\7", 0, "cdr")
+        serialization.velocity_in(b"\0\7", 0, "geometry_msgs/Twist", "cdr")
 
 
 def test_a_text_of_unlikely_length_is_refused():
     data = struct.pack("<4IB", 0, 0, 0, MOST_TEXT + 1, 0)
     with pytest.raises(ProtocolError, match="a text of"):
-        serialization.velocity_in("geometry_msgs/TwistStamped", data, 0, "ros1")
+        serialization.velocity_in(data, 0, "geometry_msgs/TwistStamped", "ros1")
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)
@@ -257,7 +257,7 @@ class TestMoveBase:
         array = types["actionlib_msgs/msg/GoalStatusArray"](header, [status, status])
         data = written("ros1", array)
         type = "actionlib_msgs/GoalStatusArray"
-        assert serialization.actionlib_in(type, data, 0, "ros1") == {
+        assert serialization.actionlib_in(data, 0, type, "ros1") == {
             "status_list": 2 * [{"goal_id": {"id": "g1"}, "status": 3, "text": "done"}]
         }
 
@@ -271,7 +271,7 @@ class TestMoveBase:
                 }
             },
         )
-        found = serialization.actionlib_in(type, data, 0, "ros1")
+        found = serialization.actionlib_in(data, 0, type, "ros1")
         at = found["feedback"]["base_position"]
         assert at["header"] == {"frame_id": "map"}
         assert at["pose"]["position"] == {"x": 1.0, "y": 2.0}
@@ -279,11 +279,11 @@ class TestMoveBase:
     def test_the_result_of_a_goal(self):
         status = {"goal_id": {"id": "g1"}, "status": 4, "text": "lost"}
         type, data = actionlib("Result", status=status)
-        found = serialization.actionlib_in(type, data, 0, "ros1")
+        found = serialization.actionlib_in(data, 0, type, "ros1")
         assert found == {"status": status}
 
     def test_another_type_is_left_out(self):
-        assert serialization.actionlib_in("std_msgs/Bool", b"\1", 0, "ros1") is None
+        assert serialization.actionlib_in(b"\1", 0, "std_msgs/Bool", "ros1") is None
 
 
 GOAL_FIELDS = (Key("u", "t"), "r1", "g1", 1.0, 2.0, 0.0, "a")

@@ -306,7 +306,7 @@ class FoxgloveWire:
         if channel is None:
             return None
         topic, type, encoding = channel
-        fields = serialization.actionlib_in(type, data, protocol.PAYLOAD, encoding)
+        fields = serialization.actionlib_in(data, protocol.PAYLOAD, type, encoding)
         return of_message(topic, fields, spec, goal)
 
     def read_velocity(self, data: bytes) -> tuple[str, Twist | None] | None:
@@ -316,7 +316,7 @@ class FoxgloveWire:
             return None
         topic, type, encoding = channel
         at = protocol.PAYLOAD
-        return topic, serialization.velocity_in(type, data, at, encoding)
+        return topic, serialization.velocity_in(data, at, type, encoding)
 
     def is_scan(self, data: bytes) -> bool:
         """Return whether a frame is a message of a topic of scans."""

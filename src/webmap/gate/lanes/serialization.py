@@ -95,13 +95,13 @@ class Reader:
             raise ProtocolError(f"a message of {len(self._data)} bytes is too short")
 
 
-def velocity_in(type: str, data: bytes, at: int, encoding: Encoding) -> Twist | None:
+def velocity_in(data: bytes, at: int, type: str, encoding: Encoding) -> Twist | None:
     """Return the velocity in a message, if its type has one and it is finite.
 
     Args:
-        type: The type of the message.
         data: The bytes that contain it.
         at: Where it begins.
+        type: The type of the message.
         encoding: Its encoding.
 
     Raises:
@@ -150,13 +150,13 @@ def scan_in(data: bytes, at: int, encoding: Encoding, now: float) -> Scan:
     )
 
 
-def actionlib_in(type: str, data: bytes, at: int, encoding: Encoding) -> Any:
+def actionlib_in(data: bytes, at: int, type: str, encoding: Encoding) -> Any:
     """Return the fields of a message about a goal of move_base that matter.
 
     Args:
-        type: The type of the message.
         data: The bytes that contain it.
         at: Where it begins.
+        type: The type of the message.
         encoding: Its encoding.
 
     Returns:
