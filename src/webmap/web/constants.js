@@ -21,7 +21,7 @@ export const FIRST_SHEETS = "first_parts.css";
 /** The style sheet of the other parts. */
 export const PART_SHEETS = "parts.css";
 
-/** The subprotocol of all sockets. */
+/** The subprotocol of both sockets. */
 export const PROTOCOL = "webmap";
 
 /** The field of a query that signs in once. */
