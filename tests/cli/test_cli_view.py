@@ -365,6 +365,26 @@ def test_a_robot_option_gets_the_listed_velocity_type_only_for_twist_types(
     assert ("/go  " + type in fleet.table(grid=True, only_given=True)) == bool(type)
 
 
+@pytest.mark.parametrize(
+    ("urls", "shown"),
+    [
+        (("ws://bob:9090", "foxglove://bob:8765"), ["bob"]),
+        (("foxglove://bob", "ws://bob:9090"), ["bob"]),
+        (("ws://bob:9090", "foxglove://al"), ["bob", "al"]),
+        (("ws://bob:9090", "ws://bob:9091"), ["bob (bob:9090)", "bob (bob:9091)"]),
+    ],
+)
+def test_a_robot_with_a_rosbridge_and_a_foxglove_bridge_is_shown_once(
+    capsys, urls, shown
+):
+    bridges = [Bridge(url) for url in urls]
+    fleet = find_fleet(bridges, [], wait=0.0, topics=TOPICS)
+    assert [robot.found.name for robot in fleet.robots] == shown
+    said = f"{bridges[1].url} leads to the same robots as {bridges[0].url}: they are"
+    assert (said in capsys.readouterr().err) == (len(shown) == 1)
+    assert list(fleet.behind) == bridges[: len(shown)]
+
+
 def test_a_velocity_topic_from_a_setting_gets_its_type_from_the_topic_list(bridge):
     topics = TOPICS | {"/cmd_vel_nav": STAMPED}
     settings = ["bob.velocity=/cmd_vel_nav"]

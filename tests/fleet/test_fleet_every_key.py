@@ -42,6 +42,11 @@ topic = "/mo/cmd_vel"
 type = "geometry_msgs/TwistStamped"
 bridge = "hall"
 check_every = "12h"
+drive_without_proof = true
+
+[[robots.cameras]]
+topic = "/mo/video"
+type = "foxglove_msgs/CompressedVideo"
 
 [robots.move]
 action = "/mo/m"

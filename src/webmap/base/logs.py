@@ -34,6 +34,7 @@ LOGGERS = (
     "webmap.modules.labels",
     "webmap.modules.route_tool",
     "webmap.modules.several_robots",
+    "webmap.notebook",
     "webmap.operators",
     "webmap.page",
     "webmap.robot",

@@ -5,11 +5,16 @@ import sys
 import click
 
 from webmap.base.echo import echo
-from webmap.cli.options import Finite, tls_options, verbose_option
+from webmap.cli.options import (
+    Finite,
+    bridge_argument,
+    tls_options,
+    verbose_option,
+)
 
 
 @click.command()
-@click.argument("robot", metavar="URL|FILE")
+@bridge_argument("robot", metavar="URL|FILE")
 @click.option(
     "--router",
     required=True,

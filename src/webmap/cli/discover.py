@@ -7,6 +7,7 @@ import click
 
 from webmap.base.echo import echo
 from webmap.cli.options import (
+    bridge_argument,
     one_bridge,
     topics_option,
     verbose_option,
@@ -18,7 +19,7 @@ from webmap.cli.options import (
 @click.command(
     short_help="List the robots behind a bridge, their topics, and the reasons."
 )
-@click.argument("url", nargs=-1, required=True)
+@bridge_argument("url", nargs=-1, required=True)
 @click.option("--toml", is_flag=True, help="Print a fleet file.")
 @wait_option
 @topics_option
@@ -62,7 +63,7 @@ def discover(
         text = fleet_toml([(one.label, one.url, one.findings) for one in found])
         click.echo(text, nl=False)  # not shortened, and escaped as TOML requires
     for one in found:
-        if one.trouble is not None:
+        if one.trouble is not None or one.twin:
             echo(one.why, err=True)
         elif not toml:
             echo(report(one.url, one.findings), lines=True)

@@ -8,6 +8,7 @@ import click
 from webmap.base.echo import echo
 from webmap.cli.options import (
     Finite,
+    bridge_argument,
     one_bridge,
     topics_option,
     verbose_option,
@@ -17,7 +18,7 @@ from webmap.cli.options import (
 
 
 @click.command(short_help="Diagnose what prevents driving the robots of a bridge.")
-@click.argument("url", nargs=-1, required=True, metavar="URL...|FILE.toml")
+@bridge_argument("url", nargs=-1, required=True, metavar="URL...|FILE.toml")
 @click.option(
     "--robot",
     "robots",

@@ -1,5 +1,6 @@
 """Options of several commands."""
 
+import asyncio
 import functools
 import logging
 import math
@@ -31,6 +32,20 @@ class Finite(click.FloatRange):
             self.fail(f"{value} is not a finite number.", param, ctx)
         return number
 
+
+def _recognise(_ctx: click.Context, _param: click.Parameter, value: Any) -> Any:
+    from webmap.ros.foxglove.address import recognised
+
+    given: list[str] = [value] if isinstance(value, str) else list(value)
+    found = asyncio.run(recognised(given))
+    for before, now in zip(given, found, strict=True):
+        if now != before:
+            echo(f"{before} is a Foxglove bridge: its address is {now}", err=True)
+    return found[0] if isinstance(value, str) else tuple(found)
+
+
+bridge_argument = functools.partial(click.argument, callback=_recognise)
+"""The address of a bridge, as an argument; that of a Foxglove bridge may be ``ws://``."""
 
 wait_option = click.option(
     "--wait",

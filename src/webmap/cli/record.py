@@ -8,6 +8,7 @@ import click
 from webmap.base.errors import ConfigError
 from webmap.cli.options import (
     Finite,
+    bridge_argument,
     topics_option,
     verbose_option,
     wait_option,
@@ -16,7 +17,7 @@ from webmap.cli.options import (
 
 
 @click.command(short_help="Record the topics of a bridge into a bag.")
-@click.argument("url")
+@bridge_argument("url")
 @click.option(
     "--topic",
     "only",

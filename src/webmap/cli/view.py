@@ -7,6 +7,7 @@ import click
 from webmap.base.echo import echo
 from webmap.cli.options import (
     Finite,
+    bridge_argument,
     incidents_option,
     one_bridge,
     topics_option,
@@ -15,7 +16,7 @@ from webmap.cli.options import (
 
 
 @click.command()
-@click.argument("url", nargs=-1, required=True)
+@bridge_argument("url", nargs=-1, required=True)
 @click.option(
     "--robot",
     "robots",

@@ -25,7 +25,13 @@ from webmap.fleet.robot_options import (
     same_name_error,
 )
 from webmap.fleet.view_robots import ViewRobot, ViewRobots
-from webmap.ros.names import agent_named, is_topic, is_type, normalise_topic
+from webmap.ros.names import (
+    agent_named,
+    is_foxglove_url,
+    is_topic,
+    is_type,
+    normalise_topic,
+)
 from webmap.ros.temporary_bridge import ask_topics
 
 if TYPE_CHECKING:
@@ -52,11 +58,19 @@ class SearchResult:
     topics: Mapping[str, str] = field(default_factory=dict)
     """Types by topic, as listed by the bridge or given by the user."""
 
+    twin: str = ""
+    """The address of another bridge, of another kind, that leads to the same robots."""
+
     @property
     def why(self) -> str:
         """Why no robot was found, and what to do, for people; empty if some were."""
         if self.findings.robots:
             return ""
+        if self.twin:
+            return (
+                f"{self.url} leads to the same robots as {self.twin}: they are shown "
+                f"once, through {self.twin}."
+            )
         if isinstance(self.trouble, BridgeClosed):
             return f"{self.trouble}."
         if self.trouble is not None:
@@ -84,15 +98,36 @@ async def search_bridges(
     else:
         asked = [(await _behind(url, topics), topics, None) for url in urls]
     names = bridge_labels(urls)
+    found = [one for one, _, _ in asked]
+    twins = _twins(urls, found)
     named = unique_names(
-        [(name, one) for name, (one, _, _) in zip(names, asked, strict=True)]
+        [
+            (name, Findings() if twin else one)
+            for name, one, twin in zip(names, found, twins, strict=True)
+        ]
     )
     return [
-        SearchResult(url, label, findings, trouble, listed)
-        for url, label, findings, (_, listed, trouble) in zip(
-            urls, names, named, asked, strict=True
+        SearchResult(url, label, findings, trouble, listed, twin)
+        for url, label, findings, (_, listed, trouble), twin in zip(
+            urls, names, named, asked, twins, strict=True
         )
     ]
+
+
+def _twins(urls: Sequence[str], found: Sequence[Findings]) -> list[str]:
+    """Return for each bridge an earlier one that leads to the same robots, or "".
+
+    That is a rosbridge and a Foxglove bridge of one host, with the same topics of
+    odometry.
+    """
+    known: dict[tuple[str | None, frozenset[str | None]], str] = {}
+    twins = []
+    for url, one in zip(urls, found, strict=True):
+        odometry = frozenset(robot.topic("odometry") for robot in one.robots)
+        first = known.setdefault((urlsplit(url).hostname, odometry), url)
+        differ = is_foxglove_url(first) != is_foxglove_url(url)
+        twins.append(first if odometry and differ else "")
+    return twins
 
 
 def bridge_labels(urls: Sequence[str]) -> list[str]:
@@ -277,6 +312,8 @@ def find_fleet(
     for bridge, one in zip(bridges, found, strict=True):
         if one.why:
             echo(one.why, err=True)
+        if one.twin:
+            continue
         for robot in overrides.findings(bridge.url, one.findings).robots:
             robot = _typed(robot, one.topics)
             if any(o.is_also(Candidate(bridge, robot)) for o in fleet.given):

@@ -106,7 +106,10 @@ async def fake(*channels, first=(INFO,), **options):
         ({"schema": "std_msgs/String again"}, "nested"),
         ({"schema": "12 is no definition"}, "is no field"),
         ({"schema": "int8[4000000000] data"}, "longer than any message"),
-        ({"schema": "\n".join(f"int8 a{i}" for i in range(5000))}, "fields in all"),
+        (
+            {"schema": "\n".join(f"int8 a{i}" for i in range(5000))},
+            "more than 2000 lines",
+        ),
         ({"schema": "module std_msgs {", "schemaEncoding": "ros2idl"}, "IDL"),
     ],
 )

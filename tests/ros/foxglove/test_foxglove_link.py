@@ -15,6 +15,8 @@ from equipment.foxglove_server import (
 )
 from webmap.base.errors import BridgeClosed, BridgeError, ServiceError
 from webmap.ros.bridge import Bridge
+from webmap.ros.foxglove import address
+from webmap.ros.foxglove.address import recognised
 from webmap.ros.messages import LaserScanMsg, OccupancyGridMsg, OdometryMsg
 from webmap.ros.temporary_bridge import TemporaryBridge
 
@@ -233,7 +235,8 @@ def test_nodes_are_known_when_the_server_names_them():
                 await asyncio.sleep(0.2)  # until the server has its subscription
                 server.graph({"/odom": ["/base", "/foxglove_bridge"]}, {"/odom": []})
                 await until(lambda: bridge._link._main.publishers)
-                assert await bridge.publishers("/odom") == ["/base", "/foxglove_bridge"]
+                nodes = await bridge.publishers("/odom")
+                assert sorted(nodes) == ["/base", "/foxglove_bridge"]
                 assert await bridge.other_publishers("/odom") == ["/base"]
                 assert await bridge.subscribers("/odom") == []
 
@@ -349,6 +352,63 @@ def test_a_rosbridge_is_no_foxglove_bridge_and_the_other_way_round():
                     await bridge.open()
 
     run(scenario)
+
+
+def test_a_foxglove_bridge_is_recognised_by_the_subprotocol_that_it_answers(kind):
+    async def scenario():
+        rosbridge = FakeRosbridge()
+        await rosbridge.start()
+        closed = "ws://127.0.0.1:1/path"
+        async with server_of(kind) as server:
+            url = server.url.replace("foxglove:", "ws:")
+            given = [rosbridge.url, url, closed, "fleet.toml", "zenoh://h/a"]
+            found = await recognised(given)
+        await rosbridge.stop()
+        assert found == [rosbridge.url, server.url, closed, "fleet.toml", "zenoh://h/a"]
+
+    run(scenario)
+
+
+def test_a_bridge_that_answers_nothing_is_not_waited_for(monkeypatch):
+    monkeypatch.setattr(address, "PATIENCE", 0.1)
+
+    async def scenario():
+        held = asyncio.Event()
+
+        async def hold(_reader, writer):
+            await held.wait()
+            writer.close()
+
+        silent = await asyncio.start_server(hold, "127.0.0.1", 0)
+        url = f"ws://127.0.0.1:{silent.sockets[0].getsockname()[1]}"
+        assert await recognised([url]) == [url]
+        held.set()
+        silent.close()
+        await silent.wait_closed()
+
+    run(scenario)
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ("ws://robot", "foxglove://robot:80"),
+        ("wss://robot/way", "foxgloves://robot:443/way"),
+        ("wss://robot:8765", "foxgloves://robot:8765"),
+    ],
+)
+def test_the_address_of_a_recognised_bridge_names_its_port(
+    monkeypatch, given, expected
+):
+    async def connect(_url, _subprotocols):
+        return None
+
+    async def close(_socket):
+        pass
+
+    monkeypatch.setattr(address, "connect_to", connect)
+    monkeypatch.setattr(address, "close_soon", close)
+    assert asyncio.run(recognised([given])) == [expected]
 
 
 def test_a_server_that_offers_little():

@@ -145,7 +145,7 @@ class BridgeConnection:
     async def _one_link(self) -> float:
         """Connect, serve the connection until it ends, and return its duration."""
         try:
-            link = await _connect(self.url, self._subprotocols)
+            link = await connect_to(self.url, self._subprotocols)
         except Exception as error:  # name lookup, TCP, TLS, handshake: all the same
             self._failed(_not_reached(self._named, self.url, error))
             return 0.0
@@ -154,7 +154,7 @@ class BridgeConnection:
         try:
             reason = await self._serve(link)
         except asyncio.CancelledError:
-            await _close(link)
+            await close_soon(link)
             raise
         finally:
             self._forget_link(link)
@@ -237,7 +237,14 @@ class BridgeConnection:
         liveness.ponged(time.monotonic())
 
 
-async def _connect(url: str, subprotocols: Sequence[str]) -> "WebSocketConnection":
+async def connect_to(url: str, subprotocols: Sequence[str]) -> "WebSocketConnection":
+    """Return an open connection to a bridge.
+
+    Raises:
+        OSError: If the bridge cannot be reached, or accepts none of the subprotocols.
+        websockets.exceptions.WebSocketException: If it refuses the connection.
+
+    """
     await load("webmap.ros.sockets.websocket")
 
     from websockets.asyncio.client import connect
@@ -265,7 +272,7 @@ async def _connect(url: str, subprotocols: Sequence[str]) -> "WebSocketConnectio
     )
     assert isinstance(socket, WebSocketConnection)
     if subprotocols and socket.subprotocol is None:
-        await _close(socket)
+        await close_soon(socket)
         raise ConnectionError(
             f"the server there accepts none of {', '.join(subprotocols)}: it is of "
             "another kind, such as a rosbridge, whose address begins with ws://"
@@ -275,7 +282,8 @@ async def _connect(url: str, subprotocols: Sequence[str]) -> "WebSocketConnectio
     return socket
 
 
-async def _close(socket: "WebSocketConnection") -> None:
+async def close_soon(socket: "WebSocketConnection") -> None:
+    """Close a connection; wait for the bridge for half a second at most."""
     with suppress(TimeoutError):
         async with asyncio.timeout(0.5):
             await socket.close()
