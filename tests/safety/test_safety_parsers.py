@@ -42,7 +42,7 @@ PARSERS = {
     "agents.data_messages:lean_scan": (5,),
     "agents.data_messages:read_op": (),
     "agents.data_messages:unpack": (),
-    "bags.types:bytes_of_json": ("FIELDS",),
+    "bags.types:bytes_of_json": ("FIELDS", {"ros2": True}),
     "features.cameras.video_codecs:nal_units": (),
     "features.cameras.video_codecs:read_sps": (),
     "features.tiles.tile_source:media_type": ("tile",),
@@ -197,10 +197,13 @@ def nearly_valid(draw):
 
 def parsed(name, data):
     """Let a parser read bytes; return what it raised, if it did."""
-    wanted, rest = found(name), [named(one) for one in PARSERS[name]]
+    given = PARSERS[name]
+    options = next((one for one in given if isinstance(one, dict)), {})
+    wanted = functools.partial(found(name), **options)
+    rest = [named(one) for one in given if one is not options]
     if name in ("fleet.robot_files:picture_from_agent",):
         rest, data_at = [*rest, data], 1
-    elif name.startswith("fleet.robot_files"):
+    elif name.startswith(("fleet.robot_files", "bags.types")):
         rest, data_at = [rest[0], data, *rest[1:]], 1
     else:
         rest, data_at = [data, *rest], 0
