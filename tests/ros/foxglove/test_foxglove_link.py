@@ -17,6 +17,7 @@ from webmap.base.errors import BridgeClosed, BridgeError, ServiceError
 from webmap.ros.bridge import Bridge
 from webmap.ros.foxglove import address
 from webmap.ros.foxglove.address import recognised
+from webmap.ros.foxglove.link import _is_large
 from webmap.ros.messages import LaserScanMsg, OccupancyGridMsg, OdometryMsg
 from webmap.ros.temporary_bridge import TemporaryBridge
 
@@ -106,6 +107,11 @@ def test_large_topics_have_a_connection_of_their_own(kind):
             assert scans[0].ranges[0] == 2.0
 
     run(scenario)
+
+
+def test_video_comes_over_the_connection_for_large_topics():
+    assert _is_large("foxglove_msgs/msg/CompressedVideo")
+    assert not _is_large("nav_msgs/msg/Odometry")
 
 
 def test_without_large_topics_there_is_one_connection(kind):

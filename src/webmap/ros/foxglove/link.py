@@ -22,7 +22,7 @@ from webmap.ros.foxglove.graph import FoxgloveGraph
 from webmap.ros.foxglove.messages import Format, format_of, included_text, own_channel
 from webmap.ros.foxglove.session import Session
 from webmap.ros.limits import LIMITS
-from webmap.ros.names import is_type
+from webmap.ros.names import VIDEO, is_type
 from webmap.ros.received_message import BridgeStats, ReceivedMessage
 from webmap.ros.sockets.connection import CLOSED_HERE, BridgeConnection
 from webmap.ros.subscriptions import Topic
@@ -44,7 +44,7 @@ class _Published:
 
 
 def _is_large(type: str) -> bool:
-    return is_type(type, *LIMITS)
+    return is_type(type, *LIMITS, *VIDEO)
 
 
 class FoxgloveLink:
