@@ -29,8 +29,8 @@ class Waiting:
         self._before = self._delays()
 
     def seconds(self) -> float:
-        """Return the waiting time of the thread that has waited longest since then."""
-        return max(self.of_threads().values(), default=0.0)
+        """Return how long a command may have waited since then."""
+        return of_command(self.of_threads())
 
     def of_threads(self) -> dict[tuple[int, str], float]:
         """Return the waiting time of each thread since then."""
@@ -95,16 +95,13 @@ class Contention:
 
     @property
     def waited(self) -> float:
-        """The longest wait of a command within the window, in seconds.
-
-        A command passes through all processes in turn, so their waits add up. Of the
-        threads of a process the one that waited longest counts.
-        """
-        longest: dict[int, float] = {}
-        for (pid, _), waits in self._waits.items():
-            waited = most_within(self.WINDOW, waits)
-            longest[pid] = max(waited, longest.get(pid, 0.0))
-        return sum(longest.values())
+        """The longest wait of a command within the window, in seconds."""
+        return of_command(
+            {
+                thread: most_within(self.WINDOW, waits)
+                for thread, waits in self._waits.items()
+            }
+        )
 
     def _watch(self) -> None:
         while not self._end.wait(self.PERIOD):
@@ -112,6 +109,22 @@ class Contention:
             self._steals.append((now, steal(Path("/proc/stat"))))
             for thread, waited in self._waiting.of_threads().items():
                 self._waits.setdefault(thread, []).append((now, waited))
+
+
+def of_command(waits: dict[tuple[int, str], float]) -> float:
+    """Return how long a command has waited, in seconds.
+
+    A command passes through all processes in turn, so their waits add up. Of the
+    threads of a process, the one that waited longest counts.
+
+    Args:
+        waits: The wait of each thread, by its process.
+
+    """
+    longest: dict[int, float] = {}
+    for (pid, _), waited in waits.items():
+        longest[pid] = max(waited, longest.get(pid, 0.0))
+    return sum(longest.values())
 
 
 def steal(stat: Path) -> float:

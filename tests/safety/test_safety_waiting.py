@@ -8,7 +8,7 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-from safety_waiting import Contention, Waiting, most_within, steal
+from safety_waiting import Contention, Waiting, most_within, of_command, steal
 
 pytestmark = [
     pytest.mark.safety,
@@ -59,6 +59,12 @@ def test_a_sleeping_or_ended_process_has_no_waiting_time():
         process.wait()
         assert asleep.seconds() == 0
         assert Waiting([process.pid]).seconds() == 0
+
+
+def test_the_waits_of_all_processes_add_up():
+    waits = {(1, "a"): 0.2, (1, "b"): 0.1, (2, "a"): 0.3}
+    assert of_command(waits) == pytest.approx(0.5)
+    assert of_command({}) == 0.0
 
 
 def test_most_within_returns_the_largest_growth_in_a_time_window():
