@@ -113,8 +113,9 @@ GATE_BESIDE := $(addprefix tests/gate/test_gate_,client.py assist_road.py machin
 WITH_GATE := $(filter-out $(GATE_BESIDE),$(wildcard tests/gate/test_*.py tests/base/test_*.py tests/ros/test_*.py)) \
   tests/ros/foxglove/test_foxglove_protocol.py
 test-gate: $(DEV)
-	$(BIN)/pytest -q $(TO_RESULTS) -n $(JOBS) -m "not serial" $(WITH_GATE) \
-	  --cov --cov-config=tests/gate/coverage.toml --cov-fail-under=100
+	$(PY) tools/pytest_beside.py $(JOBS) $(TO_RESULTS) -m "not serial" \
+	  --cov --cov-config=tests/gate/coverage.toml --cov-report= $(WITH_GATE)
+	$(BIN)/coverage report --rcfile=tests/gate/coverage.toml --fail-under=100
 
 # The parts of pytest besides test-gate; tests that measure time are in the last three.
 .PHONY: test-plain test-browser test-motion test-load test-time

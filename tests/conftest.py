@@ -30,8 +30,12 @@ use_own_environment()
 sys.dont_write_bytecode = False
 
 # On two busy cores, the time of an example does not depend on the code alone.
+# Each run tries other examples, so a run needs few.
 settings.register_profile(
-    "webmap", deadline=None, suppress_health_check=[HealthCheck.too_slow]
+    "webmap",
+    deadline=None,
+    max_examples=50,
+    suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("webmap")
 

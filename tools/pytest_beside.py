@@ -4,7 +4,7 @@ A browser that shares two cores with another browser may be delayed by seconds, 
 than a test allows, and a shared machine may not run for a moment. So if only a few
 tests fail, they run again. A test that fails again has failed. A test that passes is
 listed: its waiting time is too short and must be corrected. A safety test does not run
-again.
+again. If branches are counted, those of the second run are added to the first.
 
 Usage: pytest_beside.py JOBS [PYTEST ARGUMENT...]
 """
@@ -70,7 +70,9 @@ def main(jobs: str, *arguments: str) -> int:
         return status
     print("\nNow a second time, alone:", flush=True)
     results = [each for each in arguments if each.startswith("--results=")]
-    again = [sys.executable, "-m", "pytest", "-q", "-rA", *results, *tests]
+    counted = [each for each in arguments if each.startswith("--cov")]
+    added = [*counted, "--cov-append"] if counted else []
+    again = [sys.executable, "-m", "pytest", "-q", "-rA", *results, *added, *tests]
     status = subprocess.call(again)
     if status == 0:
         print(

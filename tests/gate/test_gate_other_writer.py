@@ -135,7 +135,7 @@ class TestOwnEcho:
             writer.on_echo(twist, now + 15.0)
         assert writer.seen is None
 
-    @settings(deadline=None, max_examples=200)
+    @settings(deadline=None, max_examples=50)
     @given(
         st.lists(
             st.tuples(

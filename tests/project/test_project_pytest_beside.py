@@ -24,14 +24,18 @@ def test_once():
 
 @pytest.fixture
 def run(tmp_path):
-    def run(source: str) -> tuple[int, str]:
+    def run(source: str, *options: str) -> tuple[int, str]:
         (tmp_path / "test_it.py").write_text(source)
         (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n  safety\n")
-        command = [sys.executable, str(TOOL), "2", "-p", "xdist", "test_it.py"]
+        command = [sys.executable, str(TOOL), "2", *options, "test_it.py"]
         done = subprocess.run(
             command,
             cwd=tmp_path,
-            env=os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},
+            env=os.environ
+            | {
+                "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1",
+                "PYTEST_ADDOPTS": "-p xdist -p pytest_cov",
+            },
             capture_output=True,
             text=True,
             check=False,
@@ -54,6 +58,17 @@ def test_a_test_that_also_fails_the_second_time_fails_the_run(run):
     assert status == 1
     assert "2 failed at first" in shown
     assert "correct these tests" not in shown
+
+
+def test_branches_of_the_second_run_are_added(run, tmp_path):
+    text = "def f(x):\n    if x:\n        return 1\n    return 2\n"
+    (tmp_path / "counted.py").write_text(text)
+    source = ONCE.replace("    assert", "    f(existed)\n    assert")
+    test = "\n\ndef test_f():\n    f(False)\n"
+    status, _ = run("from counted import f\n" + source + test, "--cov=counted")
+    assert status == 0
+    report = [sys.executable, "-m", "coverage", "report", "--fail-under=100"]
+    assert subprocess.run(report, cwd=tmp_path, check=False).returncode == 0
 
 
 def test_a_failed_safety_test_is_not_repeated(run):

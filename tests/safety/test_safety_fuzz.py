@@ -125,7 +125,7 @@ values = st.recursive(
 )
 
 
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=60)
 @given(st.lists(st.binary(max_size=200) | st.text(max_size=200), max_size=15))
 def test_random_bytes_and_texts_never_move_the_robot(texts):
     bench = armed()
@@ -135,7 +135,7 @@ def test_random_bytes_and_texts_never_move_the_robot(texts):
     assert moved(bench) == []
 
 
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=100)
 @given(st.binary(max_size=1200) | st.text(max_size=200) | values.map(json.dumps))
 def test_a_stop_command_with_any_bytes_after_its_beginning_still_stops_the_robot(rest):
     bench = armed()
@@ -145,7 +145,7 @@ def test_a_stop_command_with_any_bytes_after_its_beginning_still_stops_the_robot
     assert bench.written[-1].twist.is_zero
 
 
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=60)
 @given(st.lists(values, max_size=15))
 def test_random_json_never_moves_the_robot(whole):
     bench = armed()
@@ -155,7 +155,7 @@ def test_random_json_never_moves_the_robot(whole):
     assert moved(bench) == []
 
 
-@settings(deadline=None, max_examples=400)
+@settings(deadline=None, max_examples=100)
 @given(st.data())
 def test_a_command_with_one_invalid_field_never_moves_the_robot(data):
     bench = armed()

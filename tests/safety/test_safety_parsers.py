@@ -234,7 +234,7 @@ def test_nearly_valid_bytes_break_no_parser(name, data):
     parsed(name, data)
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(data=nearly_valid())
 def test_no_bytes_break_the_reading_of_a_message_as_any_type(data):
     for view in views():
@@ -254,7 +254,7 @@ SERIALIZED = [
 """Readers of serialized messages."""
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(data=nearly_valid())
 def test_no_bytes_break_the_reading_of_serialized_messages(data):
     for read in SERIALIZED:
@@ -262,7 +262,7 @@ def test_no_bytes_break_the_reading_of_serialized_messages(data):
             read(data)
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(data=nearly_valid(), language=st.sampled_from(["ros2msg", "ros1msg", "ros2idl"]))
 def test_no_text_breaks_the_reading_of_a_schema(data, language):
     for text in (data.decode(errors="replace"), f"module a {{ {data!r} }};"):

@@ -75,7 +75,7 @@ def texts(draw):
     return parts
 
 
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(data=st.data(), parts=texts())
 def test_messages_of_random_types_are_read_as_by_rosbags(data, parts):
     for encoding, language in LANGUAGES.items():

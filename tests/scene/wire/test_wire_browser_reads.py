@@ -61,7 +61,7 @@ def decoder():
 
 @pytest.mark.slow
 @given(histories)
-@settings(max_examples=150)
+@settings(max_examples=60)
 def test_the_browser_decoder_builds_the_same_tree_for_any_scene_history(
     decoder, history
 ):
@@ -86,7 +86,7 @@ line_steps = st.lists(
 @patch.object(Line, "KNOWN", 3)
 @given(steps=line_steps)
 @example(steps=[ADD, ("other",), ("one",), ADD, ("other",), ("page", 0), ADD])
-@settings(max_examples=200)
+@settings(max_examples=60)
 def test_every_page_has_the_points_of_a_line_after_any_steps(decoder, steps):
     """The line moves between two fragments; the pages are late by a number of steps."""
     line, places, count = svg.polyline(), [svg.g(), svg.g()], itertools.count()

@@ -119,7 +119,7 @@ def test_dots_are_where_the_rays_hit(decoder, name):
     ),
     st.sampled_from([0.001, 0.004, 0.016]),
 )
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_the_page_reads_any_distances(decoder, reach, detail):
     scan = rays(reach)
     session, _, path, _ = shown()
