@@ -17,6 +17,8 @@ from webmap import Bridge, Robot
 from webmap.base.errors import BridgeClosed, ConfigError
 from webmap.console import make_robot
 from webmap.discovery import discover
+from webmap.discovery.doctor import BridgeFacts, judge
+from webmap.discovery.doctor.measure import observe, tried
 from webmap.fleet.overrides import Overrides
 from webmap.ros import names
 from webmap.ros.messages import LaserScanMsg, OccupancyGridMsg
@@ -130,6 +132,28 @@ def test_the_link_of_the_example_reads_on_after_an_invalid_line(bad, caplog):
             assert caplog.text.count("a line without a message") == 1
 
     run(scenario)
+
+
+def test_a_robot_behind_another_link_is_examined_and_reported_as_not_driven():
+    async def scenario():
+        async with LinesRobot() as robot:
+            return await tried(await observe(robot.url, seconds=1.0))
+
+    seen = asyncio.run(asyncio.wait_for(scenario(), 60))
+    found = {finding.text: finding for finding in judge(seen)}
+    assert "The bridge lists its topics; robots found: robot." in found
+    assert any("/odom" in text and "in the frame odom" in text for text in found)
+    wrong = [text for text, finding in found.items() if finding.level == "wrong"]
+    assert wrong == [
+        "The robots behind this kind of bridge can be watched and not driven."
+    ]
+    assert not any("/cmd_vel" in text or "stop test" in text for text in found)
+    assert not any("rosbridge" in text or "rosapi" in text for text in found)
+
+
+def test_another_kind_of_bridge_that_is_not_there_is_no_rosbridge():
+    (finding,) = judge(BridgeFacts(URL, trouble="nothing listens there"))
+    assert finding.text == "The bridge cannot be reached: nothing listens there."
 
 
 @pytest.mark.slow
