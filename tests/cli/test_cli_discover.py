@@ -44,6 +44,6 @@ def test_discover_waits_for_an_unreachable_bridge_and_then_fails():
     result = discover("ws://127.0.0.1:1", "--wait", "2")
     assert result.returncode == 1
     assert result.stdout == ""
-    assert "Waiting for the rosbridge at ws://127.0.0.1:1" in result.stderr
+    assert "Waiting for the bridge at ws://127.0.0.1:1" in result.stderr
     assert "cannot reach" in result.stderr
     assert "Traceback" not in result.stderr

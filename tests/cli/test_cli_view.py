@@ -102,7 +102,7 @@ def test_a_robot_option_replaces_the_discovered_robot_with_the_same_topics(ros1)
 def test_view_opens_the_page_without_a_bridge_and_robots_appear_later(later_port):
     with viewing(f"ws://127.0.0.1:{later_port}", "--wait", "3") as view:
         assert re.fullmatch(READY, view.process.stdout.readline())
-        view.wait_for(r"Waiting for the rosbridge at ws://127\.0\.0\.1")
+        view.wait_for(r"Waiting for the bridge at ws://127\.0\.0\.1")
         view.wait_for("cannot reach the rosbridge")
         with simulator("--port", str(later_port), "--robots", "1"):
             view.wait_for(r"A robot appeared behind ws://.*: robot_0: odometry", 40)
@@ -142,7 +142,7 @@ def test_a_signal_ends_the_wait_for_a_bridge_with_exit_code_0(sig):
         text=True,
     ) as process:
         view = View(process)
-        view.wait_for("Waiting for the rosbridge")
+        view.wait_for("Waiting for the bridge")
         process.send_signal(sig)
         assert process.wait(15) == 0
         view.read_all()

@@ -9,7 +9,8 @@ from webmap import Bridge, Robot, RobotConfig
 from webmap.base.errors import ConfigError
 from webmap.console import Console, make_robot, open_console
 from webmap.console.page import build
-from webmap.console.robot_list import RobotList
+from webmap.console.robot_card import RobotCard
+from webmap.console.robot_list import RobotList, StateWords
 from webmap.core.base_page import PageEntry
 from webmap.core.operators import Viewer
 from webmap.core.page import Page, site
@@ -291,5 +292,35 @@ def test_robots_whose_state_is_the_same_set_no_attribute_of_their_lines(
             listed.poll()
             for robot in robots:
                 robot.notify_modules("on_report", None)
+
+    on_a_page(scenario, bridge, robots)
+
+
+def words_of(words: StateWords) -> str:
+    _old, activity, _own, *conditions = words.element.children
+    return "".join(each.text for each in (activity, *conditions))
+
+
+def test_the_list_the_card_and_the_map_show_the_same_state_of_a_robot(bridge, robots):
+    def scenario(page):
+        bob, (map,) = robots[0], page.maps
+        parts = {type(module): module for module in map.modules}
+        listed, card = parts[RobotList], parts[RobotCard]
+        map.set_selected(bob)
+
+        def shown():
+            listed.poll()
+            card.poll()
+            row = listed._rows[id(bob)]
+            on_map = bob.svg.children[0].text.removeprefix("Bob: ")
+            assert words_of(row._words) == words_of(card._words) == on_map
+            assert row.element.get("data-state") == bob.svg.get("data-state")
+            return on_map
+
+        before = shown()
+        bob.goal_failed = True  # changes the state without a report
+        assert shown() == before
+        bob._show_state()
+        assert shown() == f"{before} · goal failed"
 
     on_a_page(scenario, bridge, robots)

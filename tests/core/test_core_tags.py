@@ -1,5 +1,6 @@
 """Data for lists of robots: tags, the battery, and a failed goal."""
 
+import asyncio
 from types import SimpleNamespace
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from webmap import Robot, RobotConfig
 from webmap.base.errors import ConfigError
 from webmap.core.robot import apply_config
+from webmap.core.robot_state import EVERY
 
 
 @pytest.fixture
@@ -97,3 +99,14 @@ def test_modules_are_notified_of_a_changed_state_once(robot):
     robot._show_state()
     robot._show_state()
     assert found == ["goal_failed"]
+
+
+def test_the_shown_state_is_updated_regularly_also_after_another_start(robot):
+    async def scenario(failed):
+        robot._look_regularly()
+        robot.goal_failed = failed
+        await asyncio.sleep(2 * EVERY)
+        return robot.shown_state.name
+
+    assert asyncio.run(scenario(True)) == "goal_failed"
+    assert asyncio.run(scenario(False)) == "watched"

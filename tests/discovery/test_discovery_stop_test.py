@@ -133,7 +133,7 @@ def test_a_stop_test_interrupted_before_the_bridge_opens_gives_no_result(number)
         stderr=subprocess.PIPE,
         text=True,
     ) as process:
-        assert "Waiting for the rosbridge" in process.stderr.readline()
+        assert "Waiting for the bridge" in process.stderr.readline()
         process.send_signal(number)
         assert "nothing was moved" in process.stdout.read()
         assert process.wait(10) == UNKNOWN

@@ -1,42 +1,48 @@
 """Another kind of link: a bridge uses it, and its robots can only be watched."""
 
-import os
+import asyncio
+import contextlib
+import math
 import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from pigeon_link import PigeonLink
+from lines_robot import LinesRobot
 
+from equipment.fake_rosbridge import until
+from examples.link.lines_link import PORT, LinesLink
 from webmap import Bridge, Robot
-from webmap.base.errors import ConfigError
+from webmap.base.errors import BridgeClosed, ConfigError
 from webmap.console import make_robot
 from webmap.discovery import discover
+from webmap.discovery.doctor import BridgeFacts, judge
+from webmap.discovery.doctor.measure import observe, tried
 from webmap.fleet.overrides import Overrides
-from webmap.ros import bridge as bridge_module
 from webmap.ros import names
+from webmap.ros.messages import LaserScanMsg, OccupancyGridMsg
 
 ROOT = Path(__file__).parents[2]
-URL = "pigeon://loft:7"
+URL = "lines://loft:7"
 KINDS = """
-from pigeon_link import PigeonLink
+from examples.link.lines_link import LinesLink
 from webmap.ros.bridge import LINKS
 
 
-class OtherConstructor(PigeonLink):
+class OtherConstructor(LinesLink):
     def __init__(self, url: str) -> None: ...
 
 
-class OtherMethod(PigeonLink):
+class OtherMethod(LinesLink):
     def publish(self, topic: str) -> None: ...  # type: ignore[override]
 
 
-class OtherGraph(PigeonLink):
+class OtherGraph(LinesLink):
     graph: None  # type: ignore[assignment]
 
 
-LINKS["pigeon"] = PigeonLink
+LINKS["lines"] = LinesLink
 LINKS["a"] = OtherConstructor  # wrong
 LINKS["b"] = OtherMethod  # wrong
 LINKS["c"] = OtherGraph  # wrong
@@ -50,25 +56,104 @@ TOPICS = {
 }
 
 
-@pytest.fixture(autouse=True)
-def pigeons(monkeypatch):
-    monkeypatch.setitem(bridge_module.LINKS, "pigeon", PigeonLink)
-    monkeypatch.setitem(names._DEFAULT_PORT, "pigeon", 7)
+def test_an_address_with_the_scheme_of_another_link_makes_a_bridge_of_its_kind():
+    bridge = Bridge(f"Lines://Loft:{PORT}/")
+    assert (bridge.url, bridge.state) == ("lines://loft", "new")
+    assert isinstance(bridge._link, LinesLink)
 
 
-def test_a_bridge_uses_another_kind_of_link():
-    bridge = Bridge("Pigeon://Loft:7/")
-    assert (bridge.url, bridge.state) == ("pigeon://loft", "new")
-    assert isinstance(bridge._link, PigeonLink)
+@contextlib.asynccontextmanager
+async def watched(*extra):
+    """Run a robot and a bridge that is connected to it."""
+    async with LinesRobot() as robot:
+        robot.extra = list(extra)
+        bridge = Bridge(robot.url)
+        bridge.start(asyncio.get_running_loop())
+        try:
+            await until(lambda: bridge.state == "open")
+            yield robot, bridge
+        finally:
+            await bridge.stop()
 
 
-def test_a_bridge_delivers_the_messages_of_another_kind_of_link():
-    bridge, got = Bridge(URL), []
-    subscription = bridge.subscribe("/odom", got.append)
-    bridge._link.pigeon_came("/odom", b'{"x": 1.5}')
-    subscription.remove()
-    bridge._link.pigeon_came("/odom", b'{"x": 2.5}')
-    assert got == [{"x": 1.5}]
+def run(scenario):
+    asyncio.run(asyncio.wait_for(scenario(), 30))
+
+
+def test_the_link_of_the_example_shows_pose_map_and_scan_of_a_robot():
+    async def scenario():
+        async with watched() as (_, bridge):
+            robot, scans, grids = Robot("Bob"), [], []
+            robot.set_odometry_topic(bridge, "/odom")
+            bridge.subscribe("/scan", scans.append, decode=LaserScanMsg)
+            bridge.subscribe("/map", grids.append, decode=OccupancyGridMsg)
+            await until(lambda: scans and grids and robot.pose.x == 1.5)
+            assert str(list(scans[0].range_values.values)) == "[2.0, nan, 3.0]"
+            assert grids[0].info.width == 2
+            robot.destroy()
+
+    run(scenario)
+
+
+def test_the_link_of_the_example_publishes_and_connects_again():
+    async def scenario():
+        async with watched() as (robot, bridge):
+            got, reasons = [], []
+            bridge.subscribe("/odom", got.append)
+            bridge.on_close(reasons.append)
+            bridge.publish("/hello", {"data": "hi"}, "std_msgs/String")
+            await until(lambda: robot.received)
+            assert robot.received == [
+                {"topic": "/hello", "type": "std_msgs/String", "msg": {"data": "hi"}}
+            ]
+            with pytest.raises(ValueError, match="JSON compliant"):
+                bridge.publish("/hello", {"data": math.nan}, "std_msgs/String")
+            await robot.stop()
+            await until(lambda: reasons)
+            assert (bridge.state, bridge.lost) == ("connecting", True)
+            with pytest.raises(BridgeClosed):
+                bridge.publish("/hello", {"data": "hi"})
+            got.clear()
+            await robot.start()
+            await until(lambda: got)
+            assert (bridge.state, bridge.stats.links) == ("open", 2)
+
+    run(scenario)
+
+
+@pytest.mark.parametrize("bad", [b"{\n", b"\xff\n", b"[]\n", b'{"topic": 1}\n', b"\n"])
+def test_the_link_of_the_example_reads_on_after_an_invalid_line(bad, caplog):
+    async def scenario():
+        async with watched(bad, bad) as (_, bridge):
+            got = []
+            bridge.subscribe("/odom", got.append)
+            await until(lambda: got)
+            assert bridge.stats.malformed == 2
+            assert caplog.text.count("a line without a message") == 1
+
+    run(scenario)
+
+
+def test_a_robot_behind_another_link_is_examined_and_reported_as_not_driven():
+    async def scenario():
+        async with LinesRobot() as robot:
+            return await tried(await observe(robot.url, seconds=1.0))
+
+    seen = asyncio.run(asyncio.wait_for(scenario(), 60))
+    found = {finding.text: finding for finding in judge(seen)}
+    assert "The bridge lists its topics; robots found: robot." in found
+    assert any("/odom" in text and "in the frame odom" in text for text in found)
+    wrong = [text for text, finding in found.items() if finding.level == "wrong"]
+    assert wrong == [
+        "The robots behind this kind of bridge can be watched and not driven."
+    ]
+    assert not any("/cmd_vel" in text or "stop test" in text for text in found)
+    assert not any("rosbridge" in text or "rosapi" in text for text in found)
+
+
+def test_another_kind_of_bridge_that_is_not_there_is_no_rosbridge():
+    (finding,) = judge(BridgeFacts(URL, trouble="nothing listens there"))
+    assert finding.text == "The bridge cannot be reached: nothing listens there."
 
 
 @pytest.mark.slow
@@ -78,14 +163,13 @@ def test_mypy_accepts_a_right_kind_of_link_and_refuses_wrong_ones(tmp_path):
     run = subprocess.run(
         [sys.executable, "-m", "mypy", "--strict", file],
         cwd=ROOT,
-        env={**os.environ, "MYPYPATH": str(Path(__file__).parent)},
         capture_output=True,
         text=True,
     )
     found = [int(n) for n in re.findall(r"kinds\.py:(\d+): error: ", run.stdout)]
     lines = enumerate(KINDS.splitlines(), 1)
     assert found == [n for n, line in lines if "wrong" in line], run.stdout
-    assert f"Found {len(found)} errors" in run.stdout  # and none in pigeon_link.py
+    assert f"Found {len(found)} errors" in run.stdout  # and none in lines_link.py
 
 
 def test_a_robot_that_is_found_behind_another_link_is_shown_and_not_driven(caplog):
@@ -105,7 +189,7 @@ def test_the_address_of_another_link_is_refused_for_driving():
     robot.destroy()
 
 
-@pytest.mark.parametrize("wrong", ["http://loft", "", "pigeon://", "pigeon://a@loft"])
+@pytest.mark.parametrize("wrong", ["http://loft", "", "lines://", "lines://a@loft"])
 def test_an_error_about_an_address_does_not_name_one_kind_of_link(wrong):
     with pytest.raises(ConfigError, match="address of a bridge"):
         names.normalise_url(wrong)

@@ -58,6 +58,6 @@ def test_only_corners_in_order_around_the_robot_make_an_outline(corners):
 
 @pytest.mark.parametrize("key", ["bridge_url", "goal_url"])
 def test_an_address_that_the_gate_has_no_lane_for_is_refused(monkeypatch, key):
-    monkeypatch.setitem(names._DEFAULT_PORT, "pigeon", 7)
+    monkeypatch.setitem(names.DEFAULT_PORTS, "pigeon", 7)
     with pytest.raises(ConfigError, match="cannot move robots behind pigeon://loft"):
         checked(spec(**{key: "pigeon://loft"}))

@@ -1,6 +1,7 @@
 import asyncio
 import os
 import signal
+import sys
 from array import array
 from collections import deque
 
@@ -13,8 +14,10 @@ from equipment.fake_rosbridge import bridged, until
 from webmap.base.errors import ProtocolError
 from webmap.ros import offload, worker
 from webmap.ros.bridge import Bridge
+from webmap.ros.decoding import decode_json
 from webmap.ros.messages import LaserScanMsg, OccupancyGridMsg
 from webmap.ros.offload import Offload
+from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.rosbridge.events import Publish
 
 MAP = (CAPTURED / "ros2/publish_map.ros2.json").read_bytes()
@@ -60,6 +63,43 @@ def test_the_worker_decodes_a_large_message_to_the_same_value(view):
         await decoded(there, view)
         assert there.is_decoded(view)
         assert there.decode(view) == here.decode(view)
+
+    run(scenario)
+
+
+class OwnMessage(ReceivedMessage):
+    """A message of a link that is not part of WebMap: JSON without a head."""
+
+    def check_count(self) -> None:
+        pass
+
+    def _decode(self, type):
+        return decode_json(self.frame, type or dict)
+
+
+def own(text="y" * offload.LARGE):
+    return OwnMessage("/a", msgspec.json.encode({"text": text}))
+
+
+def test_the_worker_decodes_the_messages_of_a_link_outside_of_webmap(monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
+
+    async def scenario():
+        message = own()
+        await decoded(message, None)
+        assert message.decode() == own().decode()
+
+    run(scenario)
+
+
+def test_a_link_whose_message_class_the_worker_cannot_import_gets_advice(monkeypatch):
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+
+    async def scenario():
+        message = own()
+        await decoded(message, None)
+        with pytest.raises(ProtocolError, match="install the package of this link"):
+            message.decode()
 
     run(scenario)
 

@@ -174,7 +174,7 @@ async def _topics(
         return dict(stated)
 
     def waiting(why: str) -> None:
-        echo(f"Waiting for the rosbridge at {url}: {why}", err=True)
+        echo(f"Waiting for the bridge at {url}: {why}", err=True)
 
     try:
         return await ask_topics(url, wait=wait, waiting=waiting)

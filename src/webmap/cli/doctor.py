@@ -124,7 +124,7 @@ def doctor(
     for number, (address, configured, trouble) in enumerate(bridges):
 
         def waiting(why: str, address: str = address) -> None:
-            echo(f"Waiting for the rosbridge at {address}: {why}", err=True)
+            echo(f"Waiting for the bridge at {address}: {why}", err=True)
 
         seen = BridgeFacts(address, trouble=trouble)
         if not trouble:

@@ -151,7 +151,7 @@ class RobotCard:
         """Show who has control, the speed limit and the speed."""
         robot = self._robot
         assert robot is not None
-        state, report = robot.state, robot.report
+        state, report = robot.shown_state, robot.report
         shape, tone, _ = look_of(robot)
         self._shape.show(shape)
         you = self.map.page.viewer.operator
@@ -252,7 +252,7 @@ class RobotCard:
         robot, viewer = self._robot, self.map.page.viewer
         if robot is None or not viewer.may_drive(robot.id):
             return
-        if robot.state.name == "gone":
+        if robot.shown_state.name == "gone":
             self._remove(robot)
 
     def _forget_goal(self) -> None:
@@ -273,6 +273,10 @@ class RobotTriggers:
 
     def on_report(self, report: object) -> None:
         """Show the drive state."""
+        self._card.show_state()
+
+    def on_state(self, state: object) -> None:
+        """Show the state, which may change without a report."""
         self._card.show_state()
 
     def on_battery_update(self, battery: object) -> None:

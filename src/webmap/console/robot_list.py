@@ -102,7 +102,7 @@ class RobotList:
             row.show_marked(row.robot in self.map.marked)
 
     def poll(self) -> None:
-        """Update the values without a trigger: ages, and lost connections."""
+        """Update the values without a trigger, such as ages."""
         for row in self._rows.values():
             row.poll()
 
@@ -152,7 +152,7 @@ class Row:
 
     def on_state(self, state: object = None) -> None:
         """Show the state, and what the list is ordered and grouped by."""
-        robot, now = self.robot, self.robot.state
+        robot, now = self.robot, self.robot.shown_state
         charge, bridge = robot.charge, robot.pose_source.bridge
         tag = next(iter(robot.tags), "")
         address = "" if bridge is None else bridge.name or bridge.url
@@ -178,10 +178,6 @@ class Row:
         }.items():
             self.element.set(f"data-{name}", value or None)
 
-    def on_report(self, report: object = None) -> None:
-        """Show who has control."""
-        self.on_state()
-
     def on_battery_update(self, battery: Any) -> None:
         """Show the charge, by which the list may be ordered."""
         self.on_state()
@@ -196,7 +192,7 @@ class Row:
         self.element.set("data-marked", "" if marked else None)
 
     def poll(self) -> None:
-        """Update the age of the pose, and the state of the connection."""
+        """Update the age of the pose, and the tag and the bridge of the robot."""
         age = self.robot.pose_age
         if age is not None:
             self._age.set_age(age)
@@ -222,7 +218,7 @@ class StateWords:
 
     def show(self, robot: "Robot", person: str) -> None:
         """Show the state of a robot on a page of a person."""
-        state = robot.state
+        state = robot.shown_state
         if state == self._shown:
             return  # a status that is written again may be read aloud again
         self._shown = state

@@ -91,7 +91,7 @@ def icon(symbol: str) -> Element:
 
 def look_of(robot: "Robot") -> Look:
     """Return the symbol, the tone and the group of the robot's state."""
-    return LOOKS[robot.state.name]
+    return LOOKS[robot.shown_state.name]
 
 
 def needs_person(robot: "Robot") -> bool:
@@ -291,13 +291,13 @@ class StateMark:
         """Show the symbol of the state; its words only if it needs a person."""
         robot, look = self.robot, look_of(self.robot)
         self._use.set(href=f"#{look.symbol}")
-        state = robot.state
+        shown = robot.shown_state
         # Who has control is in the list: on the map it would cover other robots.
-        held = state.activity == "held" and state.conditions
-        words = state.conditions_text if held else state.text
+        held = shown.activity == "held" and shown.conditions
+        words = shown.conditions_text if held else shown.text
         self._words.text = words if needs_person(robot) else ""
         robot.svg.set("data-tone", look.tone or None)
         robot.svg.set("data-group", look.group)
         title = robot.svg.children[0]
         assert isinstance(title, Element), "a robot's group begins with its title"
-        title.text = f"{robot.name}: {robot.state.text}"
+        title.text = f"{robot.name}: {shown.text}"

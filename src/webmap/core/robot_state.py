@@ -334,7 +334,7 @@ def _moves(facts: Facts) -> bool:
     return moves(twist, MOVES, TURNS)
 
 
-EVERY = 0.5
+EVERY = 0.25
 """Seconds between two looks at a robot while somebody looks at the pages."""
 
 AT_ONCE = 50
@@ -355,17 +355,17 @@ class StateRounds:
         self._timer: asyncio.TimerHandle | None = None
         audience.follow(self)
 
-    def join(self, look: Callable[[], None]) -> bool:
+    def join(self, look: Callable[[], None]) -> asyncio.AbstractEventLoop | None:
         """Call ``look`` regularly in the running event loop.
 
         Returns:
-            Whether a loop runs; without one, nothing is done.
+            That loop; None if no loop runs, and nothing was done.
 
         """
         try:
             loop = asyncio.get_running_loop()
         except RuntimeError:
-            return False
+            return None
         if self._looks and loop is not self._loop:  # WebMap was started again
             self._looks.clear()
             self._timer = None
@@ -373,7 +373,7 @@ class StateRounds:
         self._looks.append(look)
         if self._timer is None:
             self._wait(loop, 1)
-        return True
+        return loop
 
     def leave(self, look: Callable[[], None]) -> None:
         """Call ``look`` no more; does nothing if it is not called."""

@@ -1,5 +1,6 @@
 """The pose and the drawing of a robot, and what lists of robots show."""
 
+import asyncio
 import logging
 import math
 import time
@@ -87,8 +88,9 @@ class VisibleRobot(MovableRobot):
         self.measured_twist: Twist | None = None
         self.valid = False
         self._state_shown: RobotState | None = None
-        self._is_looked_at = False
-        """Whether the shown state is updated regularly: a lost robot sends nothing."""
+        self._looked_at_in: asyncio.AbstractEventLoop | None = None
+        """The event loop that regularly updates the shown state, since a lost robot
+        sends nothing."""
         self.pose_stamp: float | None = None
         """When the newest pose was sent, in seconds of ``time.monotonic()``; None
         before the first one."""
@@ -130,6 +132,15 @@ class VisibleRobot(MovableRobot):
                 self.motion.writers,
             )
         )
+
+    @property
+    def shown_state(self) -> RobotState:
+        """The state that all parts of all pages show.
+
+        It is :attr:`state` when the gate last reported, or at the last of the regular
+        looks, so two parts of a page never show different states.
+        """
+        return self._state_shown or self.state
 
     @property
     def has_own_goal(self) -> bool:
@@ -370,6 +381,7 @@ class VisibleRobot(MovableRobot):
             self.model_images.show(map.page)
             self.maps.append(map)
             self._shown_problems.join(map)
+            self._look_regularly()
         else:
             self.maps.remove(map)
             self._shown_problems.leave(map)
@@ -408,6 +420,12 @@ class VisibleRobot(MovableRobot):
             self._draw_age(self.pose_stamp)
             self._show_state()
         self.pose_source.draw()
+
+    def _look_regularly(self) -> None:
+        loop = self._looked_at_in
+        if loop is None or loop.is_closed():  # it ends when WebMap stops
+            self._show_state()
+            self._looked_at_in = state_rounds.join(self._show_state)
 
     def _show_state(self) -> None:
         self.pose_source.keep_on(self._needs_poses())
@@ -458,9 +476,7 @@ class VisibleRobot(MovableRobot):
             self.pose_stamp = stamp
             if audience.present:
                 self._draw_age(stamp)
-            if not self._is_looked_at:
-                self._show_state()
-                self._is_looked_at = state_rounds.join(self._show_state)
+            self._look_regularly()
         if (
             self.valid
             and pose.position == self.position

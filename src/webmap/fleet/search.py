@@ -152,7 +152,7 @@ async def _ask(
     url: str, wait: float
 ) -> tuple[Findings, Mapping[str, str], BridgeError | None]:
     def waiting(why: str) -> None:
-        echo(f"Waiting for the rosbridge at {url}: {why}", err=True)
+        echo(f"Waiting for the bridge at {url}: {why}", err=True)
 
     try:
         topics = await ask_topics(url, wait=wait, waiting=waiting)

@@ -44,7 +44,7 @@ _HOMES = {
     "zenoh": "webmap.agents.link",
     "zenohs": "webmap.agents.link",
 }
-"""Modules that add a kind of link when they are imported."""
+"""Modules of WebMap that add a kind of link when they are imported."""
 
 
 def _link_type(url: str) -> LinkType:

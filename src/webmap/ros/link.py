@@ -1,6 +1,7 @@
 """What a bridge needs of a link, the way in which it speaks to one ROS system.
 
-*A new kind of link* in the design has the rules that no type can state.
+*A new kind of link* in the design has the rules that no type can state. All methods are
+called in the model's thread.
 """
 
 import asyncio
@@ -13,44 +14,114 @@ from webmap.ros.subscriptions import Topic
 
 
 class _Lane(Protocol):
+    """The connection that carries the messages."""
+
     @property
-    def state(self) -> LinkState: ...
+    def state(self) -> LinkState:
+        """``connecting`` also between two attempts, ``closed`` only after a stop."""
+
     @property
-    def last_heard(self) -> float | None: ...
+    def last_heard(self) -> float | None:
+        """When the last bytes came, on the monotonic clock; None before the first."""
+
     @property
-    def lag(self) -> float: ...
-    def start(self, loop: asyncio.AbstractEventLoop) -> None: ...
+    def lag(self) -> float:
+        """Approximate delay of the data that now comes, in seconds; 0 if not known."""
+
+    def start(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Begin to connect, and connect again after each loss and failed attempt.
+
+        A second call while it runs has no effect. It is also called after
+        ``_Link.stop``.
+
+        Args:
+            loop: The event loop, which runs in the model's thread.
+
+        """
 
 
 class _Graph(Protocol):
-    def known(self, topic: str) -> str | None: ...
-    async def topics(self) -> dict[str, str]: ...
-    async def topic_type(self, topic: str) -> str | None: ...
-    async def service_type(self, service: str) -> str | None: ...
+    """What is known of the ROS system; None means unknown or no answer."""
+
+    def known(self, topic: str) -> str | None:
+        """Return the known type of ``topic``, without a question."""
+
+    async def topics(self) -> dict[str, str]:
+        """Return the topics and the type of each, also before ``lane.start()``.
+
+        Raises:
+            BridgeClosed: If the robot cannot be reached.
+            ServiceError: If it does not list its topics.
+
+        """
+
+    async def topic_type(self, topic: str) -> str | None:
+        """Return the type of ``topic``, in any dialect."""
+
+    async def service_type(self, service: str) -> str | None:
+        """Return the type of ``service``, in any dialect."""
+
     async def nodes(
         self, kind: Literal["publishers", "subscribers"], topic: str
-    ) -> list[str] | None: ...
-    async def other_publishers(self, topic: str) -> list[str] | None: ...
-    async def definitions(self, type: str, kind: str) -> Definitions: ...
-    async def time(self) -> float | None: ...
-    async def set_parameter(self, name: str, value: Any, patience: float) -> Any: ...
+    ) -> list[str] | None:
+        """Return the names of the nodes of a kind."""
+
+    async def other_publishers(self, topic: str) -> list[str] | None:
+        """Return the publishers without those that publish for WebMap."""
+
+    async def definitions(self, type: str, kind: str) -> Definitions:
+        """Return the definitions of a type: see :meth:`webmap.Bridge.definitions`."""
+
+    async def time(self) -> float | None:
+        """Return the time of the ROS system in seconds since 1970."""
+
+    async def set_parameter(self, name: str, value: Any, patience: float) -> Any:
+        """Set a parameter and return its new value, or raise ServiceError."""
 
 
 class _Link(Protocol):
     stats: BridgeStats
+    """Counts of the connection, which the link keeps."""
+
     trouble: str | None
+    """Why the connection is not open: set by the link; None while it is open."""
+
     over: str | None
+    """Why no connection is opened any more: set by the bridge, which has ended."""
 
     @property
     def lane(self) -> _Lane: ...
     @property
     def graph(self) -> _Graph: ...
-    def refuse_if_over(self) -> None: ...
-    def subscribe(self, topic: Topic) -> None: ...
-    def unsubscribe(self, topic: Topic) -> None: ...
-    def published_type(self, topic: str) -> str | None: ...
-    def publish(self, topic: str, type: str, message: Mapping[str, Any]) -> None: ...
-    def unadvertise(self, topic: str) -> None: ...
+    def refuse_if_over(self) -> None:
+        """Raise BridgeClosed with ``over``, if that is set."""
+
+    def subscribe(self, topic: Topic) -> None:
+        """Pass on the messages of a topic; called again when ``topic.options`` changes.
+
+        A link may pass on more messages than ``topic.options`` asks for, such as every
+        one: the bridge decodes those that a listener needs.
+        """
+
+    def unsubscribe(self, topic: Topic) -> None:
+        """End the subscription to a topic."""
+
+    def published_type(self, topic: str) -> str | None:
+        """Return the type with which ``topic`` is published here, None if it is not."""
+
+    def publish(self, topic: str, type: str, message: Mapping[str, Any]) -> None:
+        """Send a message now, or raise an error; nothing is queued for later.
+
+        Raises:
+            BridgeClosed: If the connection is not open, or accepts no more data.
+            ValueError: If a number is NaN or infinite, and the link writes JSON.
+            TypeError: If a value has no form in what the link writes.
+
+        """
+
+    def unadvertise(self, topic: str) -> None:
+        """Stop publishing on ``topic``; no effect if it was not published."""
+
     async def call_service(
         self,
         service: str,
@@ -58,8 +129,17 @@ class _Link(Protocol):
         *,
         type: str | None,
         timeout: float,
-    ) -> Any: ...
-    async def stop(self) -> None: ...
+    ) -> Any:
+        """Call a service and return the fields of the response.
+
+        Raises:
+            ServiceError: If the service fails or does not respond in time.
+            BridgeClosed: If the connection cannot be opened, or ends before that.
+
+        """
+
+    async def stop(self) -> None:
+        """Close every connection; keep the subscriptions for another start."""
 
 
 class LinkType(Protocol):
@@ -75,4 +155,16 @@ class LinkType(Protocol):
         received: Callable[[Topic, ReceivedMessage], bool],
         report: Callable[[Exception], None],
     ) -> _Link:
-        """Make the link of one bridge, which opens no connection yet."""
+        """Make the link of one bridge, which opens no connection yet.
+
+        Args:
+            url: The normalised address: without the port if that is the default one.
+            name: The bridge's name, as shown to people.
+            opened: To call when the connection is open.
+            closed: To call when an open connection has ended, with a reason.
+            received: To call with each message of a subscribed topic. It returns
+                whether the message can be used; a link may ignore that.
+            report: To call with each error that a person may need to know, such as a
+                failed attempt to connect. It logs nothing: the link does.
+
+        """

@@ -13,8 +13,10 @@ _TYPE = re.compile(
     r"/(?P<name>[A-Za-z][A-Za-z0-9_]*)\Z"
 )
 _HOST = re.compile(r"(?:[A-Za-z0-9.-]+|\[[0-9A-Fa-f:.]+\])(?::\d{1,5})?(?:/[^\s]*)?")
-_DEFAULT_PORT = {"ws": 80, "wss": 443, "foxglove": 8765, "foxgloves": 8765}
-_DEFAULT_PORT |= {"zenoh": 7447, "zenohs": 7447}
+
+DEFAULT_PORTS = {"ws": 80, "wss": 443, "foxglove": 8765, "foxgloves": 8765}
+DEFAULT_PORTS |= {"zenoh": 7447, "zenohs": 7447}
+"""The port of an address without one, by the scheme: those of all kinds of links."""
 
 PICTURES = ("sensor_msgs/CompressedImage", "sensor_msgs/Image")
 """The types of pictures."""
@@ -23,8 +25,9 @@ VIDEO = ("foxglove_msgs/CompressedVideo", "ffmpeg_image_transport_msgs/FFMPEGPac
 """The types of video: a message refers to earlier ones, so each of them counts."""
 
 _AGENTS = ("zenoh", "zenohs")
+_ROSBRIDGE = ("ws", "wss")
 _FOXGLOVE = {"foxglove": "ws", "foxgloves": "wss"}
-_WITH_GATE = ("ws", "wss", *_FOXGLOVE, *_AGENTS)
+_WITH_GATE = (*_ROSBRIDGE, *_FOXGLOVE, *_AGENTS)
 _MAX_NAME = 255
 _THIS_COMPUTER = ("localhost", "127.0.0.1", "[::1]")
 
@@ -126,6 +129,11 @@ def has_gate(url: str) -> bool:
     return url.partition("://")[0].strip().lower() in _WITH_GATE
 
 
+def is_rosbridge_url(url: str) -> bool:
+    """Return whether an address is one of a rosbridge."""
+    return url.partition("://")[0].strip().lower() in _ROSBRIDGE
+
+
 def is_foxglove_url(url: str) -> bool:
     """Return whether an address is one of a ``foxglove_bridge``."""
     return url.partition("://")[0].strip().lower() in _FOXGLOVE
@@ -138,7 +146,7 @@ def web_socket_url(url: str) -> str:
         return url
     place = parts.netloc
     if parts.port is None:
-        place = f"{place}:{_DEFAULT_PORT[parts.scheme]}"
+        place = f"{place}:{DEFAULT_PORTS[parts.scheme]}"
     return urlunsplit(parts._replace(scheme=_FOXGLOVE[parts.scheme], netloc=place))
 
 
@@ -169,14 +177,14 @@ def normalise_url(url: str) -> str:
         ) from None
     if "://" not in url and _HOST.fullmatch(url.strip()):
         hint = f"did you mean 'ws://{url.strip()}'?"
-    if parts.scheme not in _DEFAULT_PORT or not host or port == 0:
+    if parts.scheme not in DEFAULT_PORTS or not host or port == 0:
         raise ConfigError(f"{url!r} is not the address of a bridge: {hint}")
     if parts.username is not None or parts.fragment:
         raise ConfigError(
             f"the address of a bridge holds no user name and no fragment: {hint}"
         )
     place = f"[{host}]" if ":" in host else host
-    if port is not None and port != _DEFAULT_PORT[parts.scheme]:
+    if port is not None and port != DEFAULT_PORTS[parts.scheme]:
         place = f"{place}:{port}"
     path = parts.path.rstrip("/")
     return urlunsplit((parts.scheme, place, path, parts.query, ""))

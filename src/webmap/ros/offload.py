@@ -22,6 +22,7 @@ from webmap.ros.worker import (
     MAX_MESSAGE,
     WorkRequest,
     WorkResult,
+    class_name,
     item_type,
     view_name,
 )
@@ -335,7 +336,7 @@ class Offload:
                 request = WorkRequest(
                     len(message.frame),
                     message.topic,
-                    view_name(message.__class__),
+                    class_name(message.__class__),
                     view_name(type),
                     arguments=list(message.arguments),
                 )

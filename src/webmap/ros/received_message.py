@@ -67,7 +67,7 @@ class ReceivedMessage:
 
     @property
     def arguments(self) -> tuple[str | None, ...]:
-        """What the constructor needs after the topic and the bytes elsewhere."""
+        """Further arguments with which the worker process makes the same message."""
         return ()
 
     @property
@@ -84,7 +84,7 @@ class ReceivedMessage:
         raise NotImplementedError
 
     def check_count(self) -> None:
-        """Check the number of values in the message before it is built.
+        """Check the number of values in the message before they are built.
 
         Raises:
             TooLarge: If the message has too many values.
@@ -93,6 +93,7 @@ class ReceivedMessage:
         raise NotImplementedError
 
     def _decode(self, type: type[msgspec.Struct] | None) -> Any:
+        """Return the message as ``type``, as a plain dict, or raise ProtocolError."""
         raise NotImplementedError
 
     def __repr__(self) -> str:

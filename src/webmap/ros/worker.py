@@ -22,6 +22,7 @@ from webmap.base.errors import ProtocolError
 from webmap.base.processes import return_large_pieces
 from webmap.ros.arrays import Numbers
 from webmap.ros.limits import check_items
+from webmap.ros.received_message import ReceivedMessage
 
 LENGTH = struct.Struct("<I")
 MAX_MESSAGE = 512 << 20
@@ -82,13 +83,23 @@ def view_name(thing: Any) -> str | None:
     return f"{thing.__module__}:{thing.__qualname__}"
 
 
+def class_name(of: type[ReceivedMessage]) -> str:
+    """Return the worker's name for a class of messages, of WebMap or of another link.
+
+    The worker must be able to import the class: its module is in an installed package,
+    or in a folder of ``PYTHONPATH``.
+    """
+    return f"{of.__module__}:{of.__qualname__}"
+
+
 def answer(request: WorkRequest, data: bytes) -> tuple[WorkResult, list[bytes]]:
     """Return what a request asks for, in parts; never raises an error."""
     try:
         if request.call is not None:
             made = _named(request.call)(data, *request.arguments)
             return WorkResult([len(made)]), [made]
-        received = _named(request.message)(request.topic, data, *request.arguments)
+        message_class = _message_class(request.message)
+        received = message_class(request.topic, data, *request.arguments)
         received.check_count()
         view = _named(request.view)
         message = received.decode(view)
@@ -102,6 +113,17 @@ def answer(request: WorkRequest, data: bytes) -> tuple[WorkResult, list[bytes]]:
         return WorkResult(error=str(error), kind=type(error).__name__), []
     except Exception as error:  # the worker must survive any data
         return WorkResult(error=f"it cannot be decoded: {error!r}"), []
+
+
+def _message_class(name: str | None) -> Any:
+    try:
+        return _named(name)
+    except (ImportError, AttributeError) as error:
+        raise ProtocolError(
+            f"the process that decodes large messages cannot import the class {name} "
+            f"({error}): install the package of this link, or add its folder to "
+            "PYTHONPATH"
+        ) from None
 
 
 def _named(name: str | None) -> Any:

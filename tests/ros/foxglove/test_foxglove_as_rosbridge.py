@@ -34,7 +34,7 @@ class LinkOfAgent(RosbridgeLink):
 @pytest.fixture(autouse=True)
 def agents(monkeypatch):
     monkeypatch.setitem(bridge_module.LINKS, "agent", LinkOfAgent)
-    monkeypatch.setitem(names._DEFAULT_PORT, "agent", 1)
+    monkeypatch.setitem(names.DEFAULT_PORTS, "agent", 1)
 
 
 class Display(TemporaryBridge):

@@ -29,7 +29,13 @@ from webmap.discovery.frames import FrameCollector, frame_topics
 from webmap.discovery.robots import discover, host_name
 from webmap.ros.bridge import Bridge
 from webmap.ros.foxglove.protocol import SUBPROTOCOLS
-from webmap.ros.names import is_agent_url, is_foxglove_url, is_type, web_socket_url
+from webmap.ros.names import (
+    is_agent_url,
+    is_foxglove_url,
+    is_rosbridge_url,
+    is_type,
+    web_socket_url,
+)
 from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.rosbridge import checks
 from webmap.ros.subscriptions import Encoding
@@ -123,7 +129,7 @@ async def observe(
             if not unlisted:
                 progress("Requesting the time, the publishers and the subscribers.")
                 seen = await _ask(seen, bridge)
-                if ask_parameters and not is_foxglove_url(url):
+                if ask_parameters and (is_rosbridge_url(url) or is_agent_url(url)):
                     link = await checks.asked_about_threads(
                         seen.link, bridge.call_service
                     )
@@ -142,9 +148,12 @@ async def observe(
 
 async def _look(url: str) -> dict[str, Any]:
     """Return what is seen of the bridge itself, or known by its agent."""
+    if is_foxglove_url(url):
+        return {"link": await checks.look(web_socket_url(url), SUBPROTOCOLS)}
+    if is_rosbridge_url(url):
+        return {"link": await checks.look(url, ())}
     if not is_agent_url(url):
-        offered = SUBPROTOCOLS if is_foxglove_url(url) else ()
-        return {"link": await checks.look(web_socket_url(url), offered)}
+        return {}
     about = await asyncio.to_thread(about_agent, url)
     if about is None or about.open_at is None:
         return {}
@@ -158,6 +167,9 @@ async def tried(seen: BridgeFacts) -> BridgeFacts:
         return replace(seen, link=checks.not_tried(seen.link, why))
     if is_foxglove_url(seen.url):
         why = "clients of a Foxglove bridge can offer no service"
+        return replace(seen, link=checks.not_tried(seen.link, why))
+    if not is_rosbridge_url(seen.url):
+        why = "it is a test of a rosbridge"
         return replace(seen, link=checks.not_tried(seen.link, why))
     if seen.unlisted:
         return replace(seen, link=checks.not_tried(seen.link))

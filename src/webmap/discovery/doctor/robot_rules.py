@@ -9,7 +9,7 @@ from webmap.discovery.doctor.topic_rules import (
     shown_findings,
 )
 from webmap.discovery.findings import FoundRobot, Guess
-from webmap.ros.names import is_agent_url, is_type, same_type
+from webmap.ros.names import has_gate, is_agent_url, is_type, same_type
 from webmap.ros.rosbridge import advice
 from webmap.ros.rosbridge.advice import Finding
 from webmap.ros.rosbridge.graph import is_client_node
@@ -20,7 +20,7 @@ MOST_ODDITIES = 3
 def robot_findings(robot: FoundRobot, seen: BridgeFacts) -> Iterator[Finding]:
     """Yield the findings about one robot."""
     one = seen.configured.get(robot.name, ConfiguredRobot(robot.name))
-    if "velocity" not in one.elsewhere:
+    if has_gate(seen.url) and "velocity" not in one.elsewhere:
         yield from _velocity(robot, seen)
     if "odometry" not in one.elsewhere:
         yield from _place(robot, seen)
@@ -33,7 +33,7 @@ def robot_findings(robot: FoundRobot, seen: BridgeFacts) -> Iterator[Finding]:
     yield from _map(robot, seen)
     yield from shown_findings(robot, seen)
     yield from _frames(robot, seen)
-    if robot.first("velocity") is not None:
+    if has_gate(seen.url) and robot.first("velocity") is not None:
         # The stop test identifies robots by the names that discovery finds.
         name = one.found_as if robot.name in seen.configured else robot.name
         command = f"webmap doctor {seen.url} --stop-test {name}, or " if name else ""

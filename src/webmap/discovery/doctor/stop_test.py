@@ -206,7 +206,7 @@ def find_out(urls: Sequence[str], name: str, *, wait: float, yes: bool) -> int:
 
 async def _topics(url: str, wait: float) -> dict[str, str]:
     def waiting(why: str) -> None:
-        echo(f"Waiting for the rosbridge at {url}: {why}", err=True)
+        echo(f"Waiting for the bridge at {url}: {why}", err=True)
 
     return await ask_topics(url, wait=wait, waiting=waiting)
 

@@ -8,7 +8,13 @@ from webmap.base.text import one_line
 from webmap.discovery.doctor.facts import MOST_ROBOTS, BridgeFacts, Clock
 from webmap.discovery.doctor.robot_rules import robot_findings
 from webmap.ros.foxglove import advice as foxglove_advice
-from webmap.ros.names import agent_named, is_agent_url, is_foxglove_url
+from webmap.ros.names import (
+    agent_named,
+    has_gate,
+    is_agent_url,
+    is_foxglove_url,
+    is_rosbridge_url,
+)
 from webmap.ros.rosbridge import advice
 from webmap.ros.rosbridge.advice import BRIDGE, LEVELS, Finding, Level, listen_advice
 from webmap.ros.rosbridge.checks import is_loopback
@@ -73,10 +79,15 @@ GIVE_TOPICS = (
 )
 
 
+WATCHED = "The robots behind this kind of bridge can be watched and not driven."
+DRIVEN = "Drive them through a rosbridge, a Foxglove bridge or an agent."
+
+
 def _bridge(seen: BridgeFacts) -> Iterator[Finding]:
     """Yield the findings about the connection and everything behind it."""
     by_agent = is_agent_url(seen.url)
     by_foxglove = is_foxglove_url(seen.url)
+    by_rosbridge = is_rosbridge_url(seen.url)
     if seen.trouble:
         yield _unreachable(seen)
         return
@@ -85,8 +96,10 @@ def _bridge(seen: BridgeFacts) -> Iterator[Finding]:
         yield from _agent(seen)
     elif by_foxglove:
         yield from foxglove_advice.findings(seen.link, seen.url)
-    else:
+    elif by_rosbridge:
         yield advice.openness(seen.link, seen.url, seen.shown, dialect)
+    if not has_gate(seen.url):
+        yield Finding("wrong", BRIDGE, WATCHED, DRIVEN)
     if seen.unlisted:
         yield advice.topics_not_listed(
             seen.unlisted, "" if seen.topics_given else GIVE_TOPICS
@@ -98,7 +111,7 @@ def _bridge(seen: BridgeFacts) -> Iterator[Finding]:
     elif not seen.unlisted:
         text = "The bridge does not report its time, so clocks are not compared."
         yield Finding("note", BRIDGE, text)
-    if not by_agent and not by_foxglove:
+    if by_rosbridge:
         yield advice.blocking(seen.link, seen.url, dialect)
         yield advice.compression(seen.link, _packed_scans(seen))
 
@@ -108,7 +121,10 @@ def _unreachable(seen: BridgeFacts) -> Finding:
         return _unreachable_agent(seen)
     if is_foxglove_url(seen.url):
         return foxglove_advice.unreachable(seen.trouble)
-    return advice.unreachable(seen.trouble)
+    if is_rosbridge_url(seen.url):
+        return advice.unreachable(seen.trouble)
+    text = f"The bridge cannot be reached: {seen.trouble}."
+    return Finding("wrong", BRIDGE, text, "Start it, and check address and firewall.")
 
 
 def _packed_scans(seen: BridgeFacts) -> list[str]:
