@@ -7,12 +7,13 @@ import struct
 import time
 
 import pytest
-from link_bench import in_loop, until
+from link_bench import in_loop
 from test_gate_serialization import GOAL_FIELDS, STORES, actionlib, make, written
 from websockets.asyncio.server import serve
 from websockets.exceptions import ConnectionClosed
 
 from equipment.gate_harness import spec
+from equipment.waiting import until
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Twist
 from webmap.gate.actions import SendGoal, SendPose

@@ -6,8 +6,8 @@ import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from gate_robot import eventually
 
+from equipment.waiting import wait_for
 from webmap.gate import process
 from webmap.gate.display.client import GateClient
 
@@ -73,10 +73,10 @@ def test_all_gate_threads_have_realtime_priority_but_the_display_does_not():
     client = GateClient()
     client.start()
     try:
-        eventually(lambda: client.ready, "a gate")
+        wait_for(lambda: client.ready, "a gate")
         pid = client.pid
         wanted = {os.SCHED_RR if may else usual}
-        eventually(lambda: policies_of_threads(pid) == wanted, "its priority")
+        wait_for(lambda: policies_of_threads(pid) == wanted, "its priority")
         assert policies_of_threads(os.getpid()) == {usual}
     finally:
         client.stop()

@@ -9,7 +9,8 @@ import msgspec
 import pytest
 
 from equipment.captured_frames import CAPTURED
-from equipment.fake_rosbridge import FakeRosbridge, bridged, until
+from equipment.fake_rosbridge import FakeRosbridge, bridged
+from equipment.waiting import until
 from webmap.base.errors import (
     BridgeClosed,
     BridgeError,

@@ -9,7 +9,8 @@ import msgspec
 import pytest
 
 from equipment.captured_frames import CAPTURED
-from equipment.fake_rosbridge import bridged, until
+from equipment.fake_rosbridge import bridged
+from equipment.waiting import until
 from webmap.base.errors import ProtocolError
 from webmap.ros import offload, worker
 from webmap.ros.bridge import Bridge

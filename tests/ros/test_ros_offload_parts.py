@@ -9,7 +9,7 @@ import cbor2
 import pytest
 from test_ros_limits import publish, transforms
 
-from equipment.fake_rosbridge import until
+from equipment.waiting import until
 from webmap.features.layers.diagnostics import DiagnosticArrayMsg
 from webmap.features.layers.marker_drawing import MarkerArrayMsg
 from webmap.ros import offload, worker

@@ -4,7 +4,8 @@ import asyncio
 
 import pytest
 
-from equipment.fake_rosbridge import FakeRosbridge, bridged, until
+from equipment.fake_rosbridge import FakeRosbridge, bridged
+from equipment.waiting import until
 from webmap.base.errors import BridgeClosed
 from webmap.base.lifecycle import Lifecycle
 from webmap.base.scope import Scope

@@ -9,7 +9,7 @@ from contextlib import asynccontextmanager
 import pytest
 from websockets.asyncio.server import serve
 
-from equipment.fake_rosbridge import until
+from equipment.waiting import until
 from webmap.base.errors import BridgeClosed, BridgeError, ProtocolError, ServiceError
 from webmap.ros.foxglove import calls, link, session
 from webmap.ros.limits import MAX_FRAME

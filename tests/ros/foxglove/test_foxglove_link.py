@@ -6,13 +6,14 @@ from contextlib import asynccontextmanager
 import pytest
 from foxglove.websocket import Capability
 
-from equipment.fake_rosbridge import FakeRosbridge, until
+from equipment.fake_rosbridge import FakeRosbridge
 from equipment.foxglove_server import (
     SERVICE,
     VELOCITY,
     old_server,
     sdk_server,
 )
+from equipment.waiting import until
 from webmap.base.errors import BridgeClosed, BridgeError, ServiceError
 from webmap.ros.bridge import Bridge
 from webmap.ros.foxglove import address

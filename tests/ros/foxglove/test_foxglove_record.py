@@ -5,8 +5,8 @@ import asyncio
 import pytest
 from rosbags.highlevel import AnyReader
 
-from equipment.fake_rosbridge import until
 from equipment.foxglove_server import TOPICS, old_server, sdk_server
+from equipment.waiting import until
 from webmap.bags.record import record_to
 
 
