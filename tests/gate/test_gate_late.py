@@ -3,9 +3,14 @@
 import contextlib
 import time
 
+import pytest
+
 from equipment.waiting import wait_for
 from webmap.base.errors import NoLease
 from webmap.base.geometry import Twist
+
+# The gate drives the robot in real time; a delayed process loses control.
+pytestmark = pytest.mark.serial
 
 
 def test_a_fast_program_leaves_only_a_few_velocities_on_a_stalled_link(

@@ -15,7 +15,7 @@ from webmap.ros.callbacks import Callbacks
 
 
 def run(scenario):
-    asyncio.run(asyncio.wait_for(scenario(), 30))
+    asyncio.run(scenario())
 
 
 @pytest.fixture

@@ -56,7 +56,7 @@ def run(scenario, kind="sdk"):
             async with old_server() as server, Display(server.url) as display:
                 await scenario(server, display)
 
-    asyncio.run(asyncio.wait_for(with_server(), 60))
+    asyncio.run(with_server())
 
 
 @pytest.fixture(params=["sdk", "old"])

@@ -26,7 +26,7 @@ ODOM = {"/odom": ("nav_msgs/Odometry", None, 0)}
 
 
 def run(scenario):
-    asyncio.run(asyncio.wait_for(scenario(), 60))
+    asyncio.run(scenario())
 
 
 @asynccontextmanager
@@ -239,7 +239,6 @@ def test_nodes_are_known_when_the_server_names_them():
             async with bridged(server) as bridge:
                 await until(lambda: bridge._link._main.info)
                 assert await bridge.publishers("/odom") is None
-                await asyncio.sleep(0.2)  # until the server has its subscription
                 server.graph({"/odom": ["/base", "/foxglove_bridge"]}, {"/odom": []})
                 await until(lambda: bridge._link._main.publishers)
                 nodes = await bridge.publishers("/odom")
