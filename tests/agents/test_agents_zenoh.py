@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from equipment.waiting import wait_for
 from webmap.agents import address
 from webmap.agents.gate_messages import MOST_SAMPLE
 from webmap.agents.peer import Peer
@@ -56,13 +57,6 @@ def peers(place, *users):
             peer.start()
         wait_for(lambda: all(peer.connected for peer in made))
         yield made
-
-
-def wait_for(check, within=10.0):
-    deadline = time.monotonic() + within
-    while not check():
-        assert time.monotonic() < deadline, "timed out"
-        time.sleep(0.01)
 
 
 @pytest.fixture

@@ -5,7 +5,8 @@ import struct
 from contextlib import asynccontextmanager
 
 import websockets
-from played_bag import until
+
+from equipment.waiting import until
 
 
 @asynccontextmanager

@@ -59,13 +59,6 @@ async def played(bag, **options):
         recording.close()
 
 
-async def until(found):
-    async with asyncio.timeout(10):
-        while not (value := found()):
-            await asyncio.sleep(0.001)
-    return value
-
-
 def xs(client):
     return [
         message["pose"]["pose"]["position"]["x"] for message in client.messages("/odom")

@@ -6,10 +6,11 @@ from contextlib import asynccontextmanager
 
 import pytest
 from foxglove_client import connected
-from played_bag import Client, until, xs
+from played_bag import Client, xs
 
 from equipment.bag_files import BEGIN, FRAMES, GRID, ODOMETRY, Made, types_of
 from equipment.mcap_files import definition, odometry, write
+from equipment.waiting import until
 from webmap.bags.foxglove_server import FoxgloveServer
 from webmap.bags.player import Player
 from webmap.bags.recording import Recording

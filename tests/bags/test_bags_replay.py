@@ -6,9 +6,10 @@ import time
 
 import msgspec
 import pytest
-from played_bag import NOW, Client, played, until, xs
+from played_bag import NOW, Client, played, xs
 
 from equipment.bag_files import BEGIN, FRAMES, GRID, ODOMETRY, TWIST
+from equipment.waiting import until
 from webmap.bags import player as player_module
 from webmap.bags.playback import MARKS, STATUS
 from webmap.bags.player import REFUSED, Player

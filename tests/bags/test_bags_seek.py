@@ -4,9 +4,10 @@ import asyncio
 
 import msgspec
 import pytest
-from played_bag import Client, played, until, xs
+from played_bag import Client, played, xs
 
 from equipment.bag_files import BEGIN, FRAMES, GRID, ODOMETRY
+from equipment.waiting import until
 from webmap.bags import player as player_module
 from webmap.bags.playback import MARKS, STATUS
 from webmap.bags.recording import Recording

@@ -1,10 +1,11 @@
 """Messages of a robot's ROS, received by a client that this project did not write."""
 
 import threading
-import time
 from urllib.parse import urlsplit
 
 import roslibpy
+
+from equipment.waiting import wait_for
 
 
 class Witness:
@@ -35,13 +36,9 @@ class Witness:
 
     def newest(self, topic: str, within: float = 10.0) -> dict:
         """Return the newest message of a topic; wait for the first."""
-        deadline = time.monotonic() + within
-        while time.monotonic() < deadline:
-            with self._lock:
-                if topic in self._newest:
-                    return self._newest[topic]
-            time.sleep(0.02)
-        raise AssertionError(f"no message received on {topic}")
+        wait_for(lambda: self.count(topic), f"a message on {topic}", within)
+        with self._lock:
+            return self._newest[topic]
 
     def place(self, topic: str) -> tuple[float, float]:
         """The pose of the robot in odometry."""

@@ -5,7 +5,6 @@ import json
 import math
 import re
 import socket
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -15,6 +14,7 @@ from playwright.sync_api import expect
 
 from equipment.captured_frames import PLAYER, frame_file, played
 from equipment.processes import BRIDGE, WEB, Process, matrix, running
+from equipment.waiting import wait_for
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -111,10 +111,9 @@ def expect_recorded(tab, name: str, dialect: str) -> None:
         for u, v in recorded_dots(dialect)
     ]
     # There are fewer dots before the view is fitted to the robots.
-    deadline = time.monotonic() + 10.0
-    while len(dots := dots_in_world(tab, robot(name))) != len(expected):
-        assert time.monotonic() < deadline, f"{len(dots)} dots, not {len(expected)}"
-        tab.wait_for_timeout(100)
+    drawn = lambda: dots_in_world(tab, robot(name))  # noqa: E731
+    wait_for(lambda: len(drawn()) == len(expected), f"{len(expected)} dots", page=tab)
+    dots = drawn()
     assert len(dots) > 500
     for dot, place in zip(dots, expected, strict=True):
         assert dot == pytest.approx(place, abs=0.003)

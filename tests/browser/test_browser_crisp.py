@@ -7,7 +7,8 @@ from PIL import Image
 from playwright.sync_api import expect
 
 from equipment.chromium import watched_tab
-from equipment.processes import WEB, running, wait_until
+from equipment.processes import WEB, running
+from equipment.waiting import wait_for
 
 pytestmark = pytest.mark.browser
 
@@ -94,7 +95,7 @@ def page(server, chromium):
 def look(page, how):
     page.get_by_role("button", name=how).click()
     sized = 150.0 if how == "Near" else 4.0
-    wait_until(
+    wait_for(
         lambda: page.evaluate(
             "sized => [...document.querySelectorAll('.world')].every(world =>"
             "  (world.getCTM().a > 100) === (sized > 100))",

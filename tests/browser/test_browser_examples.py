@@ -12,14 +12,8 @@ from playwright.sync_api import expect
 from robots import Witness
 
 from equipment.chromium import hold
-from equipment.processes import (
-    BRIDGE,
-    matrix,
-    place_on_screen,
-    running,
-    serving,
-    wait_until,
-)
+from equipment.processes import BRIDGE, matrix, place_on_screen, running, serving
+from equipment.waiting import wait_for
 
 pytestmark = pytest.mark.browser
 
@@ -136,7 +130,7 @@ def test_keys_drive_the_selected_robot(tab, advanced, witness):
     expect(tab.locator("#selected")).to_have_text("Robot 0")
     hold(tab.keyboard, "a", lambda: witness.speed(ODOM)[1] > 0.3)
     tab.keyboard.up("a")
-    wait_until(lambda: witness.speed(ODOM) == (0.0, 0.0), what="standing still")
+    wait_for(lambda: witness.speed(ODOM) == (0.0, 0.0), what="standing still")
 
 
 def test_the_log_reports_when_the_simulator_dies_and_restarts(tab, tmp_path):
@@ -229,9 +223,9 @@ def test_a_followed_robot_stays_at_its_screen_position_while_moving(
             way = math.dist(start, matrix(tab, group)[4:])
             return way > 0.5
 
-        wait_until(gone, what="moving half a metre")
-    wait_until(lambda: witness.speed(ODOM) == (0.0, 0.0), what="standing still")
-    wait_until(
+        wait_for(gone, what="moving half a metre")
+    wait_for(lambda: witness.speed(ODOM) == (0.0, 0.0), what="standing still")
+    wait_for(
         lambda: matrix(tab, group)[4:] == pytest.approx(witness.place(ODOM), abs=0.01),
         what="the page showing where the robot is",
     )

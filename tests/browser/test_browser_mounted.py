@@ -8,7 +8,8 @@ import pytest
 from robots import Witness
 
 from equipment.chromium import hold
-from equipment.processes import BRIDGE, running, wait_until
+from equipment.processes import BRIDGE, running
+from equipment.waiting import wait_for
 
 pytestmark = pytest.mark.browser
 
@@ -93,7 +94,7 @@ def test_a_page_mounted_under_a_prefix_shows_and_drives_a_robot(host, simulator,
     tab.locator(".robot.selected").wait_for()
     hold(tab.keyboard, "w", lambda: witness.speed("/odom")[0] > 0.2)
     tab.keyboard.up("w")
-    wait_until(lambda: witness.speed("/odom") == (0.0, 0.0), what="standing still")
+    wait_for(lambda: witness.speed("/odom") == (0.0, 0.0), what="standing still")
     witness.close()
 
 

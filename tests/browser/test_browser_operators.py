@@ -9,7 +9,8 @@ from playwright.sync_api import expect
 from robots import Witness
 
 from equipment.chromium import hold
-from equipment.processes import BRIDGE, WEB, running, wait_until
+from equipment.processes import BRIDGE, WEB, running
+from equipment.waiting import wait_for
 
 pytestmark = pytest.mark.browser
 
@@ -59,7 +60,7 @@ def test_another_page_stops_a_driven_robot_with_stop_all(server, witness, tab, o
     row = other.locator("#robots .row")
     expect(row).to_contain_text(re.compile("has control|is driving"))
     other.get_by_role("button", name="STOP ALL").click()
-    wait_until(lambda: standing(witness), what="standing still")
+    wait_for(lambda: standing(witness), what="standing still")
     expect(row).to_contain_text("STOP active")
     tab.wait_for_timeout(700)
     assert standing(witness), "the key that is still held does not drive"
@@ -81,14 +82,14 @@ def test_keys_of_a_page_without_control_do_not_drive_the_robot(
     assert witness.speed(ODOM)[0] <= 0, "the key on the other page has no effect"
     other.keyboard.up("w")
     tab.keyboard.up("s")
-    wait_until(lambda: standing(witness), what="standing still")
+    wait_for(lambda: standing(witness), what="standing still")
 
 
 def test_killing_the_display_stops_the_robot(server, witness, tab):
     open_and_drive(tab, server, witness)
     tab.allowed = ["WebSocket", "ERR_CONNECTION"]
     os.kill(server.popen.pid, signal.SIGKILL)
-    wait_until(lambda: standing(witness), what="standing still")
+    wait_for(lambda: standing(witness), what="standing still")
     expect(tab.locator("html")).to_have_class(re.compile("disconnected"))
     expect(tab.locator(".webmap-teleop")).to_have_attribute("data-state", "lost")
     server.popen.wait()

@@ -7,7 +7,8 @@ from PIL import Image
 from playwright.sync_api import expect
 
 from equipment.chromium import watched_tab
-from equipment.processes import WEB, running, wait_until
+from equipment.processes import WEB, running
+from equipment.waiting import wait_for
 
 pytestmark = pytest.mark.browser
 
@@ -86,7 +87,7 @@ def colour(page, x, y):
 
 def test_an_image_file_beside_the_program_is_drawn_as_the_robot(page):
     # Two metres to each side of the middle, at 50 pixels to the metre.
-    wait_until(lambda: colour(page, 230, 200) == BLUE, what="the rear")
+    wait_for(lambda: colour(page, 230, 200) == BLUE, what="the rear")
     assert colour(page, 370, 200) == RED
 
 
@@ -94,7 +95,7 @@ def test_an_image_that_cannot_be_loaded_is_reported_on_the_page_and_in_the_log(
     page, server
 ):
     expect(page.locator(".webmap-notice")).to_contain_text("/nowhere.png could not be")
-    wait_until(lambda: "image /nowhere.png could not be" in server.log, what="the log")
+    wait_for(lambda: "image /nowhere.png could not be" in server.log, what="the log")
 
 
 def test_css_nth_child_finds_robots_among_other_elements_of_the_world(page):

@@ -7,7 +7,8 @@ import pytest
 from playwright.sync_api import expect
 
 from equipment.chromium import hold
-from equipment.processes import WEB, running, wait_until
+from equipment.processes import WEB, running
+from equipment.waiting import wait_for
 
 pytestmark = pytest.mark.browser
 
@@ -41,7 +42,7 @@ def test_the_page_releases_its_inputs_when_the_scene_connection_is_lost(tab):
         hold(tab.keyboard, "w", lambda: asked() == 1)
         cut.set()
         pictures[-1].close()
-        wait_until(lambda: asked() == 0, what="a neutral command")
+        wait_for(lambda: asked() == 0, what="a neutral command")
         cut.clear()
         pictures[-1].close()
         expect(tab.locator("html.disconnected")).not_to_be_attached()

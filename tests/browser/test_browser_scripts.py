@@ -3,7 +3,6 @@
 import itertools
 import json
 import re
-import time
 from typing import Literal, get_args, get_origin, get_type_hints
 
 import msgspec
@@ -12,6 +11,7 @@ from scripted_bridge import scripted_bridge
 
 from equipment.chromium import watched_tab
 from equipment.script_strings import FOUND, NOTHING, SCRIPTS, WATCH
+from equipment.waiting import polls
 from equipment.webmap_process import webmap
 from webmap.gate import protocol
 from webmap.modules.declaration import declarations
@@ -97,9 +97,9 @@ def missing(seen):
 
 def look(tab, missing):
     """Look until no text with a script is missing; return what was seen."""
-    deadline = time.monotonic() + 40
-    while lacking := missing(seen := tab.evaluate("() => [...__seen]")):
-        assert time.monotonic() < deadline, lacking
+    for _ in polls(lambda: f"the texts {lacking}", 40.0, 0.25):
+        if not (lacking := missing(seen := tab.evaluate("() => [...__seen]"))):
+            break
         tab.wait_for_timeout(250)
     assert tab.evaluate(FOUND) == NOTHING
     return seen

@@ -2,12 +2,12 @@
 
 import http.server
 import threading
-import time
 
 import pytest
 from playwright.sync_api import expect
 
 from equipment.processes import WEB, running
+from equipment.waiting import wait_for
 
 pytestmark = pytest.mark.browser
 
@@ -67,10 +67,7 @@ def test_the_file_opened_in_the_browser_signs_in_and_leaves_a_clean_url(
     monkeypatch.setenv("HOME", str(home))
     monkeypatch.setenv("BROWSER", f"{browser} %s")
     with running("run", script, "--port", 0, pattern=WEB) as process:
-        deadline = time.monotonic() + 20
-        while not file.exists():
-            assert time.monotonic() < deadline
-            time.sleep(0.02)
+        wait_for(file.exists)
         line = file.read_text().strip()
         assert line.startswith(f"file://{home}/")
         root = process.url.partition("?")[0]

@@ -6,7 +6,8 @@ from contextlib import ExitStack
 import pytest
 from playwright.sync_api import expect
 
-from equipment.processes import WEB, running, wait_until
+from equipment.processes import WEB, running
+from equipment.waiting import wait_for
 from webmap.testing.witness import WitnessRobot
 
 pytestmark = pytest.mark.browser
@@ -56,10 +57,10 @@ def test_a_robot_without_odometry_becomes_stale_on_the_page_and_in_the_log(
     bob_looks(is_old=False)
     bob.sends_telemetry = False
     bob_looks(is_old=True)
-    wait_until(lambda: "Bob: no pose for 3 s" in server.log, what="a line in the log")
+    wait_for(lambda: "Bob: no pose for 3 s" in server.log, what="a line in the log")
     bob_looks(is_old=True)
     bob.sends_telemetry = True
     bob_looks(is_old=False)
-    wait_until(lambda: "Bob: poses again" in server.log, what="another line")
+    wait_for(lambda: "Bob: poses again" in server.log, what="another line")
     assert "Ann: no pose" not in server.log
     assert "the connection ended" not in server.log

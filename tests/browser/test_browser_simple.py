@@ -8,15 +8,8 @@ from robots import Witness
 
 from equipment.chromium import hold
 from equipment.devtools import Chromium
-from equipment.processes import (
-    BRIDGE,
-    EXAMPLES,
-    WEB,
-    matrix,
-    reset,
-    running,
-    wait_until,
-)
+from equipment.processes import BRIDGE, EXAMPLES, WEB, matrix, reset, running
+from equipment.waiting import wait_for
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -114,7 +107,7 @@ def test_dragging_moves_the_view_by_the_same_distance_and_is_not_a_click(opened)
     opened.mouse.move(x + 30, y - 20, steps=4)
     opened.mouse.up()
     moved = (before[4] + 30, before[5] - 20)
-    wait_until(
+    wait_for(
         lambda: tuple(view(opened)[4:]) == pytest.approx(moved, abs=0.5),
         what="following the drag",
     )
@@ -131,7 +124,7 @@ def test_the_wheel_zooms_the_view_about_the_pointer(opened):
     world = undo(before, px, py)
     opened.mouse.move(box["x"] + px, box["y"] + py)
     opened.mouse.wheel(0, -240)
-    wait_until(lambda: view(opened)[0] > before[0] * 1.05, what="zooming")
+    wait_for(lambda: view(opened)[0] > before[0] * 1.05, what="zooming")
     assert apply(view(opened), *world) == pytest.approx((px, py), abs=0.5)
 
 
@@ -144,7 +137,7 @@ def test_shift_and_the_wheel_rotate_the_view_about_the_pointer(opened):
     opened.keyboard.down("Shift")
     opened.mouse.wheel(0, 240)
     opened.keyboard.up("Shift")
-    wait_until(lambda: abs(view(opened)[1]) > 0.1, what="turning")
+    wait_for(lambda: abs(view(opened)[1]) > 0.1, what="turning")
     after = view(opened)
     assert apply(after, *world) == pytest.approx((px, py), abs=0.5)
     assert math.hypot(after[0], after[1]) == pytest.approx(
@@ -194,8 +187,8 @@ def test_a_held_key_drives_the_selected_robot_until_release(
 
     hold(opened.keyboard, key, moving)
     opened.keyboard.up(key)
-    wait_until(lambda: witness.speed(ODOM) == (0.0, 0.0), what="standing still")
-    wait_until(
+    wait_for(lambda: witness.speed(ODOM) == (0.0, 0.0), what="standing still")
+    wait_for(
         lambda: robot_place(opened) == pytest.approx(witness.place(ODOM), abs=0.01),
         what="the page showing where the robot is",
     )
@@ -236,7 +229,7 @@ def test_a_hidden_tab_stops_the_robot_and_showing_the_tab_again_sends_nothing(
         click_on_robot(tab)
         hold(tab, "w", lambda: witness.speed(ODOM)[0] > 0.2)
         other = browser.new_tab()
-        wait_until(lambda: witness.speed(ODOM) == (0.0, 0.0), what="stopping")
+        wait_for(lambda: witness.speed(ODOM) == (0.0, 0.0), what="stopping")
         # On a busy machine the robot may have stopped earlier, as the page was delayed.
         tab.wait("document.visibilityState === 'hidden'")
         browser.activate(tab)
@@ -258,14 +251,14 @@ def test_a_closed_tab_stops_the_robot(opened, witness, other, server):
     select(other)
     hold(other.keyboard, "s", lambda: witness.speed(ODOM)[0] < -0.2)
     other.context.close()
-    wait_until(lambda: witness.speed(ODOM) == (0.0, 0.0), what="stopping")
+    wait_for(lambda: witness.speed(ODOM) == (0.0, 0.0), what="stopping")
 
 
 def test_a_stop_blocks_motion_until_reset_and_a_new_key_press(opened, witness):
     select(opened)
     hold(opened.keyboard, "s", lambda: witness.speed(ODOM)[0] < -0.2)
     opened.keyboard.press("Space")
-    wait_until(lambda: witness.speed(ODOM) == (0.0, 0.0), what="stopping")
+    wait_for(lambda: witness.speed(ODOM) == (0.0, 0.0), what="stopping")
     opened.wait_for_timeout(700)
     assert witness.speed(ODOM) == (0.0, 0.0), "the held key does not drive"
     opened.keyboard.up("s")
@@ -294,7 +287,7 @@ def test_the_view_and_the_selection_survive_a_reload(opened):
     x, y = middle(opened)
     opened.mouse.move(x, y)
     opened.mouse.wheel(0, -240)
-    wait_until(lambda: view(opened)[0] > start[0] * 1.05, what="zooming")
+    wait_for(lambda: view(opened)[0] > start[0] * 1.05, what="zooming")
     opened.wait_for_timeout(600)
     before = view(opened)
     opened.reload()

@@ -4,13 +4,13 @@ import asyncio
 import os
 import subprocess
 import sys
-import time
 
 import msgspec
 import psutil
 import pytest
 
 from equipment.command_line import run_inside
+from equipment.waiting import wait_for
 from equipment.webmap_process import simulator, webmap
 from webmap.agents import address
 from webmap.agents.announcements import PROTOCOL, Beacon, read_about
@@ -102,16 +102,6 @@ def test_rates_and_operators_are_read():
         "ann": "operator",
         "ben": "operator",
     }
-
-
-def wait_for(check, within=20.0):
-    deadline = time.monotonic() + within
-    while True:
-        found = check()
-        if found:
-            return found
-        assert time.monotonic() < deadline, "the condition did not become true"
-        time.sleep(0.05)
 
 
 def listening(command):

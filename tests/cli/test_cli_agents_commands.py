@@ -3,12 +3,12 @@
 import re
 import subprocess
 import sys
-import time
 from contextlib import contextmanager
 
 import pytest
 from rosbags.highlevel import AnyReader
 
+from equipment.waiting import wait_for
 from equipment.webmap_process import simulator
 from equipment.webmap_process import webmap as running
 from webmap.agents import address as keys
@@ -51,10 +51,7 @@ def wait_for_sign(router, name):
     peer.listen(keys.beacon(name), lambda *sign: signs.append(sign))
     peer.start()
     try:
-        deadline = time.monotonic() + 30
-        while not signs:
-            assert time.monotonic() < deadline, "the agent publishes no sign of life"
-            time.sleep(0.05)
+        wait_for(lambda: signs, "a sign of life from the agent")
     finally:
         peer.close()
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from equipment.camera_server import CameraServer
+from equipment.waiting import wait_for
 from equipment.webmap_process import simulator, webmap
 from webmap.base.tasks import LoopThread
 
@@ -108,13 +109,6 @@ def display(router, **environment):
         finally:
             process.terminate()
             process.wait(60)
-
-
-def wait_for(check, within=30.0):
-    deadline = time.monotonic() + within
-    while not check():
-        assert time.monotonic() < deadline, "the condition did not become true"
-        time.sleep(0.02)
 
 
 def test_displays_show_cameras_and_the_picture_that_only_the_agent_reaches(

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from equipment.waiting import until
 from webmap import Bridge
 from webmap.base.errors import BridgeClosed, ConfigError
 from webmap.cli import demo, demo_robots
@@ -127,13 +128,9 @@ def test_errands_are_paused_again_and_again_while_webmap_has_the_robot(
         assert bridge.sent == 0
         report(**change)
         report(**change)  # a second report does not start a second repetition
-        async with asyncio.timeout(10):
-            while bridge.sent < 4:
-                await asyncio.sleep(0.01)
+        await until(lambda: bridge.sent >= 4)
         report()
-        async with asyncio.timeout(10):
-            while not pause.is_idle:
-                await asyncio.sleep(0.01)
+        await until(lambda: pause.is_idle)
         count = bridge.sent
         report(**change)
         await asyncio.sleep(0)

@@ -15,6 +15,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from equipment.command_line import run_inside
+from equipment.waiting import wait_for
 from equipment.webmap_process import simulator
 from webmap.cli.play import replay
 
@@ -40,12 +41,10 @@ class Subscriber:
                 if operation["op"] == "publish":
                     self.received[operation["topic"]].append(operation["msg"])
 
-    def wait_for(self, topic, number, within=20.0):
-        deadline = time.monotonic() + within
-        while len(self.received[topic]) < number:
-            assert time.monotonic() < deadline, f"{topic}: {len(self.received[topic])}"
-            time.sleep(0.02)
-        return self.received[topic]
+    def wait_for(self, topic, number):
+        received = self.received[topic]
+        wait_for(lambda: len(received) >= number, f"{number} messages of {topic}")
+        return received
 
 
 @contextlib.contextmanager

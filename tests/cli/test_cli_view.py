@@ -6,12 +6,12 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from contextlib import contextmanager
 from types import SimpleNamespace
 
 import pytest
 
+from equipment.waiting import wait_for
 from equipment.webmap_process import simulator
 from webmap import Bridge
 from webmap.console import Console, make_robot
@@ -49,13 +49,12 @@ class View:
         """Wait until all output is read, before the pipe is closed."""
         self._reader.join(10)
 
-    def wait_for(self, pattern, within=20.0):
-        deadline = time.monotonic() + within
-        while time.monotonic() < deadline:
-            if re.search(pattern, self.printed):
-                return
-            time.sleep(0.05)
-        raise AssertionError(f"never printed {pattern!r}, but:\n{self.printed}")
+    def wait_for(self, pattern, seconds=20.0):
+        wait_for(
+            lambda: re.search(pattern, self.printed),
+            lambda: f"{pattern!r} in:\n{self.printed}",
+            seconds,
+        )
 
 
 @contextmanager

@@ -1,9 +1,10 @@
 """Wait until a page of the console is ready, and steps that several tests share."""
 
 import re
-import time
 
 from playwright.sync_api import Locator, Page, expect
+
+from equipment.waiting import wait_for
 
 READY = """async () => {
   const { page } = await import(document.querySelector('[src$="page.js"]').src);
@@ -16,10 +17,7 @@ READY = """async () => {
 
 def wait_until_ready(page: Page) -> None:
     """Wait until the page has loaded all its modules and style sheets."""
-    deadline = time.monotonic() + 30
-    while not page.evaluate(READY):
-        assert time.monotonic() < deadline, "a module of the page was not loaded"
-        page.wait_for_timeout(50)
+    wait_for(lambda: page.evaluate(READY), "all modules of the page", 30.0, page)
 
 
 def count_presses(page: Page) -> None:

@@ -2,10 +2,11 @@
 
 import re
 import signal
-import time
 
 import pytest
 from playwright.sync_api import Page, expect
+
+from equipment.waiting import wait_for
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -111,14 +112,6 @@ SIGNAL = """async () => {
 RESTS = "sounds.every(({ state }) => state === 'suspended')"
 
 
-def until(page: Page, condition: str) -> None:
-    """Wait for a condition of a script."""
-    deadline = time.monotonic() + SOON / 1000
-    while not page.evaluate(condition):
-        assert time.monotonic() < deadline, page.evaluate("[tones, sounds.map(String)]")
-        page.wait_for_timeout(50)
-
-
 def test_the_browser_plays_no_silence_between_two_signals(open_console):
     page = open_console()
     page.add_init_script(WATCH_SOUND)
@@ -126,7 +119,11 @@ def test_the_browser_plays_no_silence_between_two_signals(open_console):
     opened(page)
     assert page.evaluate(RESTS)
     page.evaluate(SIGNAL)
-    until(page, f"tones === 2 && {RESTS}")
+    wait_for(
+        lambda: page.evaluate(f"tones === 2 && {RESTS}"),
+        lambda: f"rest: {page.evaluate('[tones, sounds.map(String)]')}",
+        page=page,
+    )
 
 
 def test_a_page_without_the_permission_shows_why_it_gives_no_notification(open_console):

@@ -4,7 +4,6 @@ import asyncio
 import base64
 import itertools
 import re
-import time
 
 import pytest
 from console_ready import assert_free, select, wait_until_ready
@@ -13,6 +12,7 @@ from playwright.sync_api import Page, expect
 from equipment.camera_server import a_jpeg
 from equipment.chromium import Complaints
 from equipment.fake_rosbridge import FakeRosbridge
+from equipment.waiting import wait_for
 from equipment.webmap_process import page_of
 from webmap.base.tasks import LoopThread
 
@@ -136,10 +136,11 @@ def cell(wall, name: str):
 
 
 def wait_for_subscriptions(robots: Robots, *names: str) -> None:
-    wanted, end = {topic(name) for name in names}, time.monotonic() + 15
-    while robots.subscribed() != wanted:
-        assert time.monotonic() < end, (robots.subscribed(), wanted)
-        time.sleep(0.02)
+    wanted = {topic(name) for name in names}
+    wait_for(
+        lambda: robots.subscribed() == wanted,
+        lambda: f"subscriptions to {wanted}, not {robots.subscribed()}",
+    )
 
 
 def test_a_wall_subscribes_to_its_cameras_alone_and_stays_when_another_is_selected(

@@ -5,16 +5,11 @@ from dataclasses import replace
 
 import pytest
 
+from equipment.waiting import until
 from webmap import Bridge
 from webmap.discovery.doctor import BridgeFacts, ConfiguredRobot, Finding
 from webmap.features.doctor.doctor_panel import Checkup, checkup_of, groups
 from webmap.ros.rosbridge.checks import LinkFacts
-
-
-async def until(condition):
-    async with asyncio.timeout(5):
-        while not condition():
-            await asyncio.sleep(0.005)
 
 
 def test_only_one_check_of_a_bridge_runs_at_a_time():

@@ -7,7 +7,7 @@ import pytest
 from console_ready import select, title
 from playwright.sync_api import Page, expect
 
-from equipment.chromium import hold
+from equipment.chromium import end_stops, hold
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -230,14 +230,13 @@ def test_the_open_palette_lets_no_key_drive_and_stop_closes_it(open_console):
     hold(page.keyboard, "a", lambda: title(page).text_content() == "You are driving")
     page.keyboard.press("Control+k")
     expect(page.get_by_role("dialog", name="Find")).to_be_visible()
-    released = re.compile("You have control|Stopping|Preparing input")
+    # On a busy machine the gate also ends control.
+    released = re.compile("You have control|Stopping|Preparing input|Free")
     expect(title(page)).to_have_text(released)
     page.keyboard.up("a")
     page.get_by_role("button", name="STOP ALL").click()
     expect(page.get_by_role("dialog", name="Find")).to_be_hidden()
-    page.get_by_role("button", name="Reset all").click()
-    page.wait_for_timeout(400)
-    page.get_by_role("button", name="Press again").click()
+    end_stops(page.locator(".webmap-stop-list .webmap-reset"))
 
 
 def test_the_palette_finds_stop_and_a_reset_that_is_pressed_twice(open_console):

@@ -1,10 +1,11 @@
 """A page that was just opened shows "Preparing input" until a press drives."""
 
 import threading
-import time
 
 import pytest
 from playwright.sync_api import Route, expect
+
+from equipment.waiting import wait_for
 
 pytestmark = pytest.mark.browser
 
@@ -61,11 +62,13 @@ def test_the_first_press_drives_when_preparing_input_is_no_longer_shown(chromium
     page.wait_for_function(READY, polling=10)
     page.keyboard.down("a")
     title = page.locator(".webmap-teleop-title")
-    seen, deadline = set(), time.monotonic() + 10
-    while "You are driving" not in seen:
-        assert time.monotonic() < deadline, seen
+    seen = set()
+
+    def drives():
         seen.add(title.text_content())
-        page.wait_for_timeout(20)
+        return "You are driving" in seen
+
+    wait_for(drives, lambda: f"a driven robot: {seen}", page=page)
     assert "Input blocked: release all keys, then press again" not in seen
     page.keyboard.up("a")
     context.close()

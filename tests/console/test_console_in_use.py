@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from equipment.waiting import until
 from webmap import Bridge, Map, Robot, RobotConfig
 from webmap.console import make_robot
 from webmap.core.base_page import PageEntry
@@ -163,12 +164,6 @@ def press(report, label):
     (handler,) = button.handlers("click")
     handler(Event(kind="click"))
     return button
-
-
-async def until(condition):
-    async with asyncio.timeout(5):
-        while not condition():
-            await asyncio.sleep(0.005)
 
 
 @pytest.fixture

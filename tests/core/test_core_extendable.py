@@ -4,6 +4,7 @@ import asyncio
 
 import pytest
 
+from equipment.waiting import until
 from webmap import Extendable, Map, Namespace, Robot
 from webmap.base.errors import ConfigError, ModuleNotFound
 from webmap.base.scope import Removal, current_scope, keep
@@ -225,10 +226,7 @@ def test_an_exception_in_a_coroutine_trigger_is_reported(namespace):
         owner = Reporting(namespace)
         owner.add_module(Slow).go.set()
         owner.notify_modules("on_ring", 0)
-        async with asyncio.timeout(10):
-            while not owner.reported:
-                await asyncio.sleep(0)
-        (message,) = owner.reported
+        (message,) = await until(lambda: owner.reported)
         assert message.startswith("Slow.on_ring failed: ZeroDivisionError: ")
 
     asyncio.run(scenario())

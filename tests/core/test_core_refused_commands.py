@@ -1,12 +1,12 @@
 """A program gets the refusals of its commands from the process of the gate."""
 
 import json
-import time
 from types import SimpleNamespace
 
 import pytest
 
 import webmap
+from equipment.waiting import wait_for
 from webmap.base.errors import MotionError
 from webmap.core import runtime as runtime_module
 from webmap.core.runtime import Runtime
@@ -14,14 +14,6 @@ from webmap.gate.display.client import GateClient
 from webmap.testing.witness import WitnessRobot
 
 PLACE, TURN = webmap.geometry.Vector3(1.0, 2.0), webmap.geometry.Quaternion()
-
-
-def eventually(condition, what):
-    deadline = time.monotonic() + 20.0
-    while not (result := condition()):
-        assert time.monotonic() < deadline, what
-        time.sleep(0.02)
-    return result
 
 
 @pytest.fixture
@@ -55,20 +47,20 @@ def test_a_program_gets_the_refusal_of_its_goal_for_a_viewer(program):
             return False
         return True
 
-    eventually(moved, "the gate")
-    eventually(lambda: program.refused, "a refusal")
+    wait_for(moved, "the gate")
+    wait_for(lambda: program.refused, "a refusal")
     why = "viewers can only look and press STOP; driving needs an operator"
     assert program.refused == [("move", why)]
     assert any(why in text for text in texts)
     # What the viewer sends is not of the program.
     viewer.receive(json.dumps({"op": "take", "robot": bob.id}))
-    eventually(lambda: any('"what":"take"' in text for text in texts), "a refusal")
+    wait_for(lambda: any('"what":"take"' in text for text in texts), "a refusal")
     assert len(program.refused) == 1
 
 
 def test_a_program_gets_the_refusal_of_its_own_command(program):
     program.runtime.run(lambda: program.bob.acquire_lease(timeout=20.0))
     program.runtime.run(program.bob.locate, PLACE, TURN)
-    what, why = eventually(lambda: program.refused, "a refusal")[0]
+    what, why = wait_for(lambda: program.refused, "a refusal")[0]
     assert what == "locate"
     assert "initial pose" in why

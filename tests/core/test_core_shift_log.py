@@ -9,6 +9,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from equipment.waiting import wait_for
 from webmap.core.operators import Operator
 from webmap.core.shift_files import (
     LARGEST,
@@ -28,13 +29,6 @@ BOB = RobotName("r1", "Bob")
 
 def written(folder: Path) -> list[Entry]:
     return read_newest(folder, 10_000)
-
-
-def wait_until(condition, seconds=5.0):
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
 
 
 @pytest.fixture
@@ -130,7 +124,7 @@ def test_a_new_process_shows_the_entries_of_earlier_ones(tmp_path):
     second = ShiftLog()
     second.note("note", "two")
     second.begin(tmp_path)
-    wait_until(lambda: second.restored)
+    wait_for(lambda: second.restored)
     assert [entry.text for entry in second.entries()] == ["one", "two"]
     assert [entry.text for entry in second.since(0)] == ["two"]
     second.end()
@@ -183,10 +177,10 @@ def test_a_full_disk_loses_nothing_while_the_queue_has_room(tmp_path, monkeypatc
     log = ShiftLog()
     log.begin(tmp_path)
     log.note("stop", "STOP")
-    wait_until(lambda: log.trouble)
+    wait_for(lambda: log.trouble)
     assert log.trouble == "The log could not be written: No space left on device."
     full = False
-    wait_until(lambda: not log.trouble)
+    wait_for(lambda: not log.trouble)
     log.end()
     texts = [entry.text for entry in written(tmp_path)]
     assert texts[0] == "STOP"
@@ -215,7 +209,7 @@ def test_a_disk_that_hangs_or_is_full_delays_nobody_who_notes(
     assert log.lost == 50
     assert len(log.entries()) == MOST_QUEUED + 50  # pages still show them
     freed.set()
-    wait_until(lambda: log.trouble)
+    wait_for(lambda: log.trouble)
     assert log.trouble == "The log could not be written: No space left on device."
     log.end()
 

@@ -6,6 +6,7 @@ import time
 import pytest
 from frames_only import TF, publishing
 
+from equipment.waiting import until
 from webmap import Bridge
 from webmap.base.audience import audience
 from webmap.base.geometry import Pose
@@ -25,13 +26,6 @@ def chain(name: str, x: float, y: float) -> list:
     """The frames of a robot; their names begin with the robot's name."""
     odom, base = f"{name}/odom", f"{name}/base_footprint"
     return [("map", odom, Pose(x, 0.0, 0.0)), (odom, base, Pose(0.0, y, 0.5))]
-
-
-async def until(condition, seconds: float = 30.0) -> None:
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline
-        await asyncio.sleep(0.01)
 
 
 @pytest.fixture

@@ -8,6 +8,7 @@ import pytest
 from faulty_site import site
 from websockets.asyncio.server import serve
 
+from equipment.waiting import until
 from webmap.discovery.doctor import BridgeFacts, judge, measure
 from webmap.discovery.doctor.measure import observe, tried
 from webmap.discovery.doctor.samples import ENOUGH
@@ -31,9 +32,7 @@ def looked_at(system, look=None, *, seconds=SECONDS, **options):
             if look is not None:
                 look(there)
             seen = await observe(there.url, seconds=seconds, **options)
-            async with asyncio.timeout(5):
-                while there.server.sessions:
-                    await asyncio.sleep(0.01)
+            await until(lambda: not there.server.sessions)
             return there, judge(seen), seen
 
     return asyncio.run(run())

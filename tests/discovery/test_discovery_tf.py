@@ -3,12 +3,12 @@
 import asyncio
 import subprocess
 import sys
-import time
 from itertools import pairwise
 
 import pytest
 from frames_only import publishing
 
+from equipment.waiting import until
 from webmap import Bridge, Robot
 from webmap.base.geometry import Pose
 from webmap.config.robot import TfConfig
@@ -264,10 +264,3 @@ def test_ten_namespaces_with_their_own_tf_on_one_bridge_are_ten_robots(dialect):
                 await bridge.stop()
 
         asyncio.run(scenario())
-
-
-async def until(condition) -> None:
-    deadline = time.monotonic() + 20
-    while not condition():
-        assert time.monotonic() < deadline
-        await asyncio.sleep(0.01)

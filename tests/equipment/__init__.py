@@ -11,7 +11,8 @@
 - Parts of WebMap alone: ``gate_harness`` has the gate's rules with a clock of its own,
   ``server_fakes`` replaces everything behind the web server, ``ray_points`` computes
   the dots of a scan.
-- ``environment`` gives all tests the same locale, folders and fonts.
+- ``environment`` gives all tests the same locale, folders and fonts, and ``waiting``
+  waits until something is true.
 
 Test tools that users need too are in the package: ``webmap.testing`` has the witness
 robot, the fault proxy and the invariants of motion, and ``webmap sim`` has the quirks

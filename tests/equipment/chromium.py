@@ -98,25 +98,25 @@ def end_stops(button: Locator) -> None:
     """
     # The button is hidden until the gate has reported a STOP.
     expect(button).not_to_have_attribute("hidden", "")
-    _press_twice(button)
+    assert press_twice(button) == "Press again to reset"
     with suppress(AssertionError):
         expect(button).to_have_attribute("hidden", "", timeout=5_000)
         return
-    _press_twice(button)
+    assert press_twice(button) == "Press again to reset"
     expect(button).to_have_attribute("hidden", "")
 
 
-def _press_twice(button: Locator) -> None:
-    asked = button.evaluate(
+def press_twice(button: Locator) -> str:
+    """Press a button twice in time, and return its text between the presses."""
+    return button.evaluate(
         """async (e) => {
           e.click();
           await new Promise((done) => setTimeout(done, 450));
-          const asked = e.textContent;
+          const asked = e.innerText;
           e.click();
           return asked;
         }"""
     )
-    assert asked == "Press again to reset"
 
 
 def hold(keyboard: Keyboard, key: str, has_effect: Callable[[], bool]) -> None:

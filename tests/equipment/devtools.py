@@ -11,7 +11,6 @@ import shutil
 import signal
 import subprocess
 import tempfile
-import time
 import urllib.request
 from contextlib import ExitStack
 from typing import Any
@@ -19,6 +18,7 @@ from typing import Any
 from websockets.sync.client import connect
 
 from equipment.chromium import CHROMIUM_ARGS, chromium_path
+from equipment.waiting import wait_for
 
 
 class Tab:
@@ -59,13 +59,7 @@ class Tab:
 
     def wait(self, expression: str, within: float = 15.0) -> Any:
         """Wait until an expression is true in the page, and return its value."""
-        deadline = time.monotonic() + within
-        while time.monotonic() < deadline:
-            value = self.evaluate(expression)
-            if value:
-                return value
-            time.sleep(0.05)
-        raise AssertionError(f"{expression} was not true within {within} s")
+        return wait_for(lambda: self.evaluate(expression), expression, within)
 
     def go(self, url: str) -> None:
         """Open a URL."""

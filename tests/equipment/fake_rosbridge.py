@@ -6,16 +6,8 @@ from contextlib import asynccontextmanager
 
 from websockets.asyncio.server import serve
 
+from equipment.waiting import until
 from webmap.ros.bridge import Bridge
-
-DEADLINE = 30.0
-
-
-async def until(condition, what=None):
-    """Wait for a condition; fail after a deadline."""
-    async with asyncio.timeout(DEADLINE):
-        while not condition():
-            await asyncio.sleep(0.005)
 
 
 class FakeRosbridge:

@@ -78,10 +78,3 @@ async def hanging_bridge(dialect, types):
         with contextlib.suppress(asyncio.CancelledError):
             await publishing
         await bridge.server.stop()
-
-
-async def until(condition):
-    """Wait for a condition; fail after a while."""
-    async with asyncio.timeout(20):
-        while not condition():
-            await asyncio.sleep(0.005)

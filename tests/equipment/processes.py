@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +15,7 @@ from pathlib import Path
 from playwright.sync_api import Page
 
 from equipment.chromium import end_stops
+from equipment.waiting import polls
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -45,19 +45,16 @@ class Process:
     def ready(self, pattern: str, within: float = 30.0) -> str:
         """Wait for the line that reports readiness; return the URL in the line."""
         stdout = self.popen.stdout
-        deadline = time.monotonic() + within
         output = b""
-        while time.monotonic() < deadline:
+        printed = lambda: f"{pattern!r} in {output!r}\n{self.log}"  # noqa: E731
+        for _ in polls(printed, within, 0.1):
             if not select.select([stdout], [], [], 0.1)[0]:
                 continue
             chunk = os.read(stdout.fileno(), 4096)
             output += chunk
-            match = re.search(pattern, output.decode())
-            if match:
+            if match := re.search(pattern, output.decode()):
                 return match[1]
-            if not chunk:
-                break
-        raise AssertionError(f"not ready: {output!r}\n{self.log}")
+            assert chunk, f"the output ends without {printed()}"
 
     @property
     def log(self) -> str:
@@ -141,17 +138,6 @@ def place_on_screen(tab: Page, selector: str) -> tuple[float, float]:
         "e => { const m = e.getScreenCTM(); return [m.e, m.f]; }"
     )
     return x, y
-
-
-def wait_until(condition, within: float = 10.0, what: str = "it") -> None:
-    """Poll a condition until it is true."""
-    deadline = time.monotonic() + within
-    while time.monotonic() < deadline:
-        value = condition()
-        if value:
-            return value
-        time.sleep(0.05)
-    raise AssertionError(f"{what} did not happen within {within} s")
 
 
 def reset(tab: Page) -> None:

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from equipment.waiting import polls
+
 NGINX = shutil.which("nginx") or shutil.which("/usr/sbin/nginx")
 
 CONFIGURATION = """
@@ -51,13 +53,11 @@ def free_port() -> int:
 
 def wait_for_port(port: int, process: "subprocess.Popen[bytes]") -> None:
     """Return when something accepts connections at a port."""
-    deadline = time.monotonic() + 20
-    while True:
+    for _ in polls(f"port {port}", pause=0.02):
         assert process.poll() is None, "nginx has ended"
         with contextlib.suppress(OSError):
             socket.create_connection(("127.0.0.1", port), 1).close()
             return
-        assert time.monotonic() < deadline
         time.sleep(0.02)
 
 

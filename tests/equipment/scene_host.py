@@ -14,6 +14,7 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from equipment.waiting import wait_for
 from webmap.scene import svg
 from webmap.scene.document import Document
 from webmap.scene.node import Fragment
@@ -237,22 +238,7 @@ class SceneHost:
     def events(self, kind: type) -> list:
         return [event for event in self.one.events if isinstance(event, kind)]
 
-    def until(self, true, patience: float = 10.0, tab=None):
-        """Wait for a condition and return its value."""
-        deadline = time.monotonic() + patience
-        while not (value := true()):
-            assert time.monotonic() < deadline, "the condition did not become true"
-            if tab is None:
-                time.sleep(0.01)
-            else:
-                tab.wait_for_timeout(10)
-        return value
 
-
-def wait(tab, expression, patience: float = 10.0):
+def wait(tab, expression):
     """Wait until an expression is true; a page's policy forbids polling in it."""
-    deadline = time.monotonic() + patience
-    while not (value := tab.evaluate(expression)):
-        assert time.monotonic() < deadline, f"{expression} did not become true"
-        tab.wait_for_timeout(15)
-    return value
+    return wait_for(lambda: tab.evaluate(expression), expression, page=tab)

@@ -3,7 +3,6 @@
 import contextlib
 import re
 import threading
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -18,14 +17,6 @@ from webmap.server.page_socket import PageSocket
 from webmap.server.runner import listen, make_server
 
 TOKEN = "t0ken-" + "A" * 43
-
-
-def wait_for(condition: Callable[[], object], *, seconds: float = 20.0) -> None:
-    """Return once the condition holds; fail if it does not within the time."""
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline, "the condition was never met"
-        time.sleep(0.002)
 
 
 @dataclass

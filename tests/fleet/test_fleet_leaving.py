@@ -10,6 +10,7 @@ import psutil
 import pytest
 from websockets.sync.client import connect
 
+from equipment.waiting import wait_for
 from equipment.webmap_process import simulator
 
 pytestmark = pytest.mark.slow
@@ -51,6 +52,7 @@ def wait_for_messages(process, url):
     whole = psutil.Process(process.pid)
 
     def is_linked():
+        assert process.poll() is None, process.stderr.read().decode()
         for each in [whole, *whole.children(recursive=True)]:
             with contextlib.suppress(psutil.NoSuchProcess):
                 for link in each.net_connections("tcp"):
@@ -58,11 +60,7 @@ def wait_for_messages(process, url):
                         return True
         return False
 
-    deadline = time.monotonic() + 30
-    while not is_linked():
-        assert time.monotonic() < deadline
-        assert process.poll() is None, process.stderr.read().decode()
-        time.sleep(0.02)
+    wait_for(is_linked)
     time.sleep(0.5)
 
 

@@ -1,13 +1,13 @@
 """The pictures of robots in a fleet file."""
 
 import io
-import time
 
 import pytest
 from PIL import Image
 from playwright.sync_api import expect
 
 from equipment.console_page import shown
+from equipment.waiting import wait_for
 from webmap.base.errors import ConfigError
 from webmap.core.pictures import pictures
 from webmap.fleet.fleet_file import prepare
@@ -101,9 +101,11 @@ def test_the_page_draws_the_picture_at_the_robot(chromium, ros2, write):
             "() => { const i = document.querySelector('image.picture');"
             " return fetch(i.getAttribute('href')).then((r) => r.ok); }"
         )
-        deadline = time.monotonic() + 15.0
-        while look(page, image) != [BLUE, RED]:  # the view moves first
-            assert time.monotonic() < deadline, look(page, image)
+        wait_for(  # the view moves first
+            lambda: look(page, image) == [BLUE, RED],
+            lambda: f"blue and red, not {look(page, image)}",
+            page=page,
+        )
 
 
 def look(page, image):

@@ -3,7 +3,7 @@
 import json
 import threading
 
-from gate_robot import eventually
+from equipment.waiting import wait_for
 
 
 class Page:
@@ -36,7 +36,7 @@ class Page:
     def send(self, **command):
         if command["op"] == "reset" and "stop" not in command:
             robot = command["robot"]
-            stop = eventually(lambda: self.robot(robot).get("stop"), "a STOP to reset")
+            stop = wait_for(lambda: self.robot(robot).get("stop"), "a STOP to reset")
             command["stop"] = stop["id"]
         self.connection.receive(json.dumps(command))
 
@@ -78,9 +78,9 @@ class Page:
         return self.robots.get(robot, {})
 
     def take(self, robot="r1"):
-        eventually(lambda: self.robot(robot).get("armable"), "a free robot")
+        wait_for(lambda: self.robot(robot).get("armable"), "a free robot")
         self.send(op="take", robot=robot)
-        eventually(lambda: self.robot(robot).get("mine"), "the lease")
+        wait_for(lambda: self.robot(robot).get("mine"), "the lease")
 
     def drive_off(self, fake):
         """Take the robot, send released inputs, then drive."""
@@ -93,7 +93,7 @@ class Page:
             self.x = 1.0 if self.robot()["armed"] else 0.0
             return len(fake.moving) > moves
 
-        eventually(under_way, "a robot that moves")
+        wait_for(under_way, "a robot that moves")
 
     def end(self):
         self._end.set()

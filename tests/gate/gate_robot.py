@@ -165,14 +165,3 @@ class FakeRobot(Noting):
     @property
     def last_speed(self):
         return self.velocities[-1][1] if self.velocities else None
-
-
-def eventually(check, what, seconds=10.0):
-    """Wait until ``check`` returns a true value, and return the value."""
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        found = check()
-        if found:
-            return found
-        time.sleep(0.005)
-    raise AssertionError(f"timed out waiting for {what}")

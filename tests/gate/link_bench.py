@@ -17,37 +17,21 @@ from webmap.gate.lanes.lane import Lane
 from webmap.gate.lanes.sockets import SocketHandlers
 from webmap.testing.witness import WitnessBridge
 
-TIMEOUT = 30.0
-"""Seconds until a wait times out."""
-
 
 def in_loop(test):
-    """Run an async test in an event loop of its own, with a timeout."""
+    """Run an async test in an event loop of its own."""
 
     @functools.wraps(test)
     def run(*args, **kwargs):
-        async def within():
-            async with asyncio.timeout(3 * TIMEOUT):
-                await test(*args, **kwargs)
-
         with warnings.catch_warnings():
             # asyncio drops a socket that has just connected when the attempt is
             # cancelled: a lane that closes while it connects does this.
             warnings.simplefilter("ignore", ResourceWarning)
-            asyncio.run(within())
+            asyncio.run(test(*args, **kwargs))
             gc.collect()
 
     run.__signature__ = inspect.signature(test)
     return run
-
-
-async def until(check, what):
-    """Wait until ``check`` returns a true value, and return the value."""
-    deadline = time.monotonic() + TIMEOUT
-    while not (found := check()):
-        assert time.monotonic() < deadline, f"timed out waiting for {what}"
-        await asyncio.sleep(0.002)
-    return found
 
 
 class NotingBridge(Noting, WitnessBridge):

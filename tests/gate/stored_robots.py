@@ -3,7 +3,7 @@
 The folder is not written again when the code changes: a gate must read the old files.
 It was made with
 
-    python tests/gate/stored_robots.py FOLDER
+    PYTHONPATH=tests python tests/gate/stored_robots.py FOLDER
 
 by a gate that received STOPs, and that was killed while it drove a robot. The files of
 the STOP that cannot be read, and of the STOP that was being lifted, were then changed.
@@ -85,8 +85,9 @@ TESTED = {
 def main() -> None:
     """Let a gate of this version write its files to a folder."""
     from gate_page import Page
-    from gate_robot import FakeRobot, eventually
+    from gate_robot import FakeRobot
 
+    from equipment.waiting import wait_for
     from webmap.gate.disk import Records, path_of
     from webmap.gate.display.client import GateClient
     from webmap.gate.events import StopRecord
@@ -107,7 +108,7 @@ def main() -> None:
                 people[by].send(op="stop", robot=name.lower())
         ann = people["Ann"]
         for name in STOPPED:
-            eventually(lambda name=name: ann.robot(name.lower()).get("latched"), name)
+            wait_for(lambda name=name: ann.robot(name.lower()).get("latched"), name)
         ann.take("driven")
         while not fake.of("publish", "/driven/cmd_vel"):
             ann.drive(1.0 if ann.robot("driven")["armed"] else 0.0, "driven")

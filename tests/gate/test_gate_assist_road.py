@@ -8,8 +8,8 @@ import threading
 import time
 
 import pytest
-from gate_robot import eventually
 
+from equipment.waiting import wait_for
 from webmap.base.geometry import Twist
 from webmap.base.outline import polygon_around
 from webmap.gate.display.client import GateClient
@@ -75,7 +75,7 @@ def test_scan_assist_stops_a_robot_that_is_driven_towards_a_wall(gate, bridge):
             assist=AssistSpec(topic="/base_scan", footprint=polygon_around(RADIUS)),
         )
     )
-    eventually(lambda: "report" in newest and newest["report"].armable, "a link")
+    wait_for(lambda: "report" in newest and newest["report"].armable, "a link")
     gate.take("r1").result(10)
     over = threading.Event()
     wanted = [Twist(0.0, 0.0, 1.5)]
@@ -89,8 +89,8 @@ def test_scan_assist_stops_a_robot_that_is_driven_towards_a_wall(gate, bridge):
     try:
         time.sleep(1.05)  # a quarter of a turn: towards the corridor's wall
         wanted[0] = Twist(0.8, 0.0, 0.0)
-        eventually(lambda: newest["report"].measured[0] > 0.1, "driving")
-        eventually(
+        wait_for(lambda: newest["report"].measured[0] > 0.1, "driving")
+        wait_for(
             lambda: (
                 newest["report"].measured[0] == 0.0
                 and any("scan assist" in why for why in newest["report"].why)

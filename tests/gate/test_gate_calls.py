@@ -2,8 +2,9 @@
 
 import json
 
-from link_bench import in_loop, noting_bridge, raw_bridge, until
+from link_bench import in_loop, noting_bridge, raw_bridge
 
+from equipment.waiting import until
 from webmap.gate.lanes import calls
 from webmap.gate.lanes.calls import RosbridgeCall, ServiceCalls
 

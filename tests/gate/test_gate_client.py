@@ -7,8 +7,9 @@ import time
 import msgspec
 import pytest
 from gate_page import Page
-from gate_robot import FakeRobot, eventually
+from gate_robot import FakeRobot
 
+from equipment.waiting import wait_for
 from webmap.base.errors import ConfigError, MotionError, NoLease
 from webmap.base.geometry import Twist
 from webmap.gate import protocol
@@ -44,8 +45,8 @@ class TestPages:
     ):
         page.drive_off(fake)
         assert page.of("hello")[0]["connection"] == page.connection.id
-        eventually(lambda: page.robot()["echoed"] == [0.25, 0, 0, 0, 0, 0], "the echo")
-        eventually(
+        wait_for(lambda: page.robot()["echoed"] == [0.25, 0, 0, 0, 0, 0], "the echo")
+        wait_for(
             lambda: page.robot()["measured"] == [0.125, 0, -0.5, 0, 0, 0], "odometry"
         )
         report = page.robot()
@@ -59,7 +60,7 @@ class TestPages:
     ):
         page.drive_off(fake)
         page.x = 0.0
-        eventually(lambda: page.robot()["state"] == "held", "standstill")
+        wait_for(lambda: page.robot()["state"] == "held", "standstill")
         received = [t for t in fake.received if t.topic == "/cmd_vel"]
         assert [t.op for t in received[:2]] == ["subscribe", "advertise"]
         advertised = received[1].message
@@ -74,8 +75,8 @@ class TestPages:
     ):
         page.drive_off(fake)
         page.x = 0.0
-        eventually(lambda: fake.last_speed == 0, "a zero")
-        eventually(lambda: page.robot()["state"] == "held", "standstill")
+        wait_for(lambda: fake.last_speed == 0, "a zero")
+        wait_for(lambda: page.robot()["state"] == "held", "standstill")
         last_move = fake.moving[-1][0]
         zeros = [at for at, vx in fake.velocities if at > last_move]
         assert len(zeros) in range(8, 12)
@@ -89,14 +90,14 @@ class TestPages:
         page.drive_off(fake)
         page.x = None
         at = time.monotonic()
-        zero = eventually(lambda: first_zero_after(fake, at), "a zero")
+        zero = wait_for(lambda: first_zero_after(fake, at), "a zero")
         assert zero - fake.moving[-1][0] <= 0.25 + JITTER
 
     def test_closing_the_page_sends_zero_at_once(self, page, fake):
         page.drive_off(fake)
         at = time.monotonic()
         page.connection.close()
-        zero = eventually(lambda: first_zero_after(fake, at), "a zero")
+        zero = wait_for(lambda: first_zero_after(fake, at), "a zero")
         assert zero - at <= 0.1 + JITTER
 
     def test_stop_by_a_viewer_sends_zero_at_once_and_blocks_motion(
@@ -106,14 +107,14 @@ class TestPages:
         page.drive_off(fake)
         at = time.monotonic()
         viewer.send(op="stop", robot="*")
-        zero = eventually(lambda: first_zero_after(fake, at), "a zero")
+        zero = wait_for(lambda: first_zero_after(fake, at), "a zero")
         assert zero - at <= 0.05 + JITTER
-        eventually(lambda: fake.of("publish", "/cancel"), "the cancel")
-        eventually(lambda: page.robot()["latched"], "a report of the active STOP")
+        wait_for(lambda: fake.of("publish", "/cancel"), "the cancel")
+        wait_for(lambda: page.robot()["latched"], "a report of the active STOP")
         assert page.robot()["holder"] is None
         moves = len(fake.moving)
         page.x = 1.0
-        eventually(lambda: page.of("refused"), "a refusal")
+        wait_for(lambda: page.of("refused"), "a refusal")
         assert len(fake.moving) == moves
         viewer.end()
 
@@ -122,11 +123,11 @@ class TestPages:
     ):
         other = Page(client, "Ben")
         page.drive_off(fake)
-        eventually(lambda: other.robot().get("state") == "driving", "the report")
+        wait_for(lambda: other.robot().get("state") == "driving", "the report")
         assert other.robot()["holder"]["name"] == "Ann"
         assert not other.robot()["mine"]
         other.send(op="take", robot="r1")
-        refused = eventually(lambda: other.of("refused"), "a refusal")
+        refused = wait_for(lambda: other.of("refused"), "a refusal")
         assert refused[0]["why"] == "Ann has control"
         other.end()
 
@@ -136,10 +137,10 @@ class TestPages:
         page.take()
         for rubbish in ("", "{", "\ud800", "x" * 5000, '{"op":NaN}', b"\xff\x00"):
             page.connection.receive(rubbish)
-        eventually(lambda: page.of("refused"), "a refusal")
+        wait_for(lambda: page.of("refused"), "a refusal")
         for _ in range(30):
             page.connection.receive("rubbish")
-        eventually(lambda: page.closed, "the request to close the page")
+        wait_for(lambda: page.closed, "the request to close the page")
         assert fake.velocities == []
 
     def test_the_speed_limit_of_the_page_applies(self, page, fake):
@@ -150,12 +151,12 @@ class TestPages:
     def test_a_page_that_connects_later_receives_reports_of_existing_robots(
         self, page, client
     ):
-        eventually(lambda: page.robot(), "the first report")
+        wait_for(lambda: page.robot(), "the first report")
         late = Page(client, "Late")
-        eventually(lambda: late.robot(), "the report")
+        wait_for(lambda: late.robot(), "the report")
         assert [m["op"] for m in late.on_echo[:2]] == ["hello", "robot"]
         client.forget("r1")
-        eventually(lambda: late.of("gone"), "the end of the robot")
+        wait_for(lambda: late.of("gone"), "the end of the robot")
         client.forget("r1")
         late.end()
 
@@ -180,13 +181,13 @@ class TestPages:
 class TestGoals:
     def test_a_goal_is_published_on_its_topic_and_reported(self, page, fake, reports):
         page.take()
-        eventually(lambda: self._goes(page, fake, 1), "the goal")
+        wait_for(lambda: self._goes(page, fake, 1), "the goal")
         pose = fake.of("publish", "/goal")[0].message["msg"]
         assert pose["header"] == {"stamp": {"secs": 0, "nsecs": 0}, "frame_id": "map"}
         assert pose["pose"]["position"] == {"x": 1.0, "y": 2.0, "z": 0.0}
-        eventually(lambda: of(reports, protocol.SentGoal), "the report of it")
+        wait_for(lambda: of(reports, protocol.SentGoal), "the report of it")
         page.send(op="cancel", robot="r1")
-        eventually(lambda: fake.of("publish", "/cancel"), "the cancel")
+        wait_for(lambda: fake.of("publish", "/cancel"), "the cancel")
         assert fake.of("publish", "/cancel")[0].message["msg"] == {}
 
     def test_action_goals_without_an_answer_can_still_be_cancelled(
@@ -204,23 +205,23 @@ class TestGoals:
             )
             page = Page(client)
             page.take()
-            eventually(lambda: self._goes(page, fake, 1), "the goal")
+            wait_for(lambda: self._goes(page, fake, 1), "the goal")
             first = fake.of("send_action_goal")[0]
             assert first.message["args"]["pose"]["header"]["stamp"] == {
                 "sec": 0,
                 "nanosec": 0,
             }
             # The first goal may hang in its socket; the second has its own socket.
-            eventually(lambda: self._goes(page, fake, 2), "a second goal")
+            wait_for(lambda: self._goes(page, fake, 2), "a second goal")
             second = fake.of("send_action_goal")[1]
             assert second.link != first.link
             page.send(op="stop", robot="r1")
-            call = eventually(lambda: fake.of("call_service"), "the cancel")[0]
+            call = wait_for(lambda: fake.of("call_service"), "the cancel")[0]
             assert call.message["service"] == "/navigate_to_pose/_action/cancel_goal"
             assert call.link not in (first.link, second.link)
             result = {"op": "action_result", "id": second.message["id"]}
             fake.send(second.link, result)
-            eventually(lambda: second.link not in fake._sockets, "its socket's end")
+            wait_for(lambda: second.link not in fake._sockets, "its socket's end")
             page.end()
 
     def test_the_topics_of_move_base_report_the_progress_of_a_goal(
@@ -249,26 +250,26 @@ class TestGoals:
                     time.sleep(0.05)
                 return fake.of("publish", "/move_base/goal")
 
-            received = eventually(sent, "the goal")[0]
+            received = wait_for(sent, "the goal")[0]
             seen = {t.topic: t for t in fake.of("subscribe")}
             assert seen["/move_base/result"].at < received.at, "no message is missed"
             id = received.message["msg"]["goal_id"]["id"]
             status = {"goal_id": {"id": id}, "status": 1, "text": ""}
             operation = {"op": "publish", "topic": "/move_base/status"}
             fake.send(received.link, {**operation, "msg": {"status_list": [status]}})
-            eventually(lambda: goal_of("under way"), "a goal that is under way")
+            wait_for(lambda: goal_of("under way"), "a goal that is under way")
             page.send(op="cancel", robot="r1")
-            eventually(lambda: fake.of("publish", "/move_base/cancel"), "the cancel")
+            wait_for(lambda: fake.of("publish", "/move_base/cancel"), "the cancel")
             end = {**operation, "topic": "/move_base/result"}
             end["msg"] = {"status": {**status, "status": 2}, "result": {}}
             fake.send(received.link, end)
-            eventually(lambda: goal_of("cancelled"), "its end")
-            eventually(
+            wait_for(lambda: goal_of("cancelled"), "its end")
+            wait_for(
                 lambda: fake.of("unsubscribe", "/move_base/status"),
                 "the end of the subscription",
             )
             page.goal(op="locate")
-            pose = eventually(lambda: fake.of("publish", "/initialpose"), "the pose")
+            pose = wait_for(lambda: fake.of("publish", "/initialpose"), "the pose")
             covariance = pose[0].message["msg"]["pose"]["covariance"]
             assert {n: v for n, v in enumerate(covariance) if v} == {
                 0: 0.25,
@@ -288,17 +289,17 @@ class TestGoals:
             )
             page = Page(client)
             page.take()
-            eventually(lambda: self._goes(page, fake, 1), "the goal")
+            wait_for(lambda: self._goes(page, fake, 1), "the goal")
             goal = fake.of("send_action_goal")[0]
             assert goal.message["feedback"] is True
             feedback = {"op": "action_feedback", "id": goal.message["id"]}
             feedback["values"] = {"distance_remaining": 2.5, "number_of_recoveries": 1}
             fake.send(goal.link, feedback)
-            eventually(lambda: page.robot()["goal"].get("left") == 2.5, "the feedback")
+            wait_for(lambda: page.robot()["goal"].get("left") == 2.5, "the feedback")
             assert page.robot()["goal"]["recoveries"] == 1
             fake.cut(goal.link)
-            eventually(lambda: page.robot()["goal"]["state"] == "unknown", "its loss")
-            eventually(lambda: page.robot().get("armable"), "the link")
+            wait_for(lambda: page.robot()["goal"]["state"] == "unknown", "its loss")
+            wait_for(lambda: page.robot().get("armable"), "the link")
             assert len(fake.of("send_action_goal")) == 1
             page.end()
 
@@ -322,7 +323,7 @@ class TestProgram:
             except NoLease:
                 return None
 
-        return eventually(attempt, "the lease")
+        return wait_for(attempt, "the lease")
 
     def test_a_program_drives_within_the_limits_and_receives_reports(
         self, client, robot_spec, fake, reports
@@ -334,13 +335,13 @@ class TestProgram:
             client.twist("r1", Twist(9.0, 0.0, 0.5))
             return fake.moving
 
-        eventually(drive, "motion")
+        wait_for(drive, "motion")
         assert fake.last_speed in (0.25, 0.0)
-        eventually(lambda: of(reports, protocol.SentTwist), "the report of it")
+        wait_for(lambda: of(reports, protocol.SentTwist), "the report of it")
         sent = of(reports, protocol.SentTwist)[0]
         assert (sent.vx, sent.wz, sent.by) == (0.25, 0.5, "program")
         at = fake.moving[-1][0]
-        zero = eventually(lambda: first_zero_after(fake, at), "a zero")
+        zero = wait_for(lambda: first_zero_after(fake, at), "a zero")
         assert zero - fake.moving[-1][0] <= 0.25 + JITTER
 
     def test_a_program_sends_and_cancels_goals(self, client, robot_spec, fake):
@@ -352,9 +353,9 @@ class TestProgram:
             time.sleep(0.05)
             return fake.of("publish", "/goal")
 
-        eventually(move, "the goal")
+        wait_for(move, "the goal")
         client.cancel("r1")
-        eventually(lambda: fake.of("publish", "/cancel"), "the cancel")
+        wait_for(lambda: fake.of("publish", "/cancel"), "the cancel")
         client.release("r1")
         with pytest.raises(NoLease):
             client.move("r1", 1.0, 2.0, 0.5)
@@ -389,14 +390,14 @@ class TestProgram:
                 return True
             return False
 
-        eventually(refused, "a refusal")
+        wait_for(refused, "a refusal")
         assert fake.moving == []
 
     def test_stop_by_a_program_stops_a_robot_driven_by_a_page(self, client, page, fake):
         page.drive_off(fake)
         at = time.monotonic()
         client.stop_robot(None)
-        assert eventually(lambda: first_zero_after(fake, at), "a zero")
+        assert wait_for(lambda: first_zero_after(fake, at), "a zero")
 
     def test_a_gate_that_does_not_run_gives_no_lease(self):
         client = GateClient()
@@ -415,16 +416,16 @@ class TestLinks:
         def again():
             return [t for t in fake.of("publish", "/cmd_vel") if t.link not in links]
 
-        after = eventually(again, "a velocity on the new link")
+        after = wait_for(again, "a velocity on the new link")
         assert after[0].message["msg"]["linear"]["x"] == 0
-        eventually(lambda: page.robot()["link"] == "up", "the report of it")
+        wait_for(lambda: page.robot()["link"] == "up", "the report of it")
         moves = len(fake.moving)
         time.sleep(0.5)
         assert len(fake.moving) == moves
         page.x = 0.0
-        eventually(lambda: page.robot()["armed"], "an armed driver")
+        wait_for(lambda: page.robot()["armed"], "an armed driver")
         page.x = 1.0
-        eventually(lambda: len(fake.moving) > moves, "motion")
+        wait_for(lambda: len(fake.moving) > moves, "motion")
 
     def test_after_a_stall_few_late_velocities_arrive_and_the_last_is_zero(
         self, page, fake
@@ -432,11 +433,11 @@ class TestLinks:
         page.drive_off(fake)
         before = len(fake.velocities)
         fake.hold()
-        eventually(lambda: not page.robot()["armed"], "a gate that noticed the stall")
-        eventually(lambda: page.robot()["link"] == "down", "a link that is cut")
+        wait_for(lambda: not page.robot()["armed"], "a gate that noticed the stall")
+        wait_for(lambda: page.robot()["link"] == "down", "a link that is cut")
         fake.go_on()
-        eventually(lambda: page.robot()["link"] == "up", "another link")
-        eventually(lambda: fake.last_speed == 0, "a zero")
+        wait_for(lambda: page.robot()["link"] == "up", "another link")
+        wait_for(lambda: fake.last_speed == 0, "a zero")
         late = [vx for _, vx in fake.velocities[before:]]
         assert len([vx for vx in late if vx]) <= 9
         assert late[-1] == 0
@@ -444,10 +445,8 @@ class TestLinks:
     def test_a_robot_whose_odometry_ends_is_stopped_with_a_reason(self, page, fake):
         page.drive_off(fake)
         fake.sends_odometry = False
-        eventually(lambda: fake.last_speed == 0, "a zero", 3.0)
-        eventually(
-            lambda: page.robot()["reason"] == "no odometry for 1 s", "the reason"
-        )
+        wait_for(lambda: fake.last_speed == 0, "a zero", 3.0)
+        wait_for(lambda: page.robot()["reason"] == "no odometry for 1 s", "the reason")
 
 
 class TestLifecycle:
@@ -458,21 +457,21 @@ class TestLifecycle:
         page.x = None
         pid = client.pid
         os.kill(pid, signal.SIGKILL)
-        eventually(lambda: of(reports, protocol.GateDown), "the report of it")
-        eventually(lambda: len(page.of("hello")) == 2, "a new greeting")
-        eventually(lambda: page.robot().get("link") == "up", "a new link")
+        wait_for(lambda: of(reports, protocol.GateDown), "the report of it")
+        wait_for(lambda: len(page.of("hello")) == 2, "a new greeting")
+        wait_for(lambda: page.robot().get("link") == "up", "a new link")
         assert client.pid != pid
         # The newest report may still be the last report of the killed gate.
-        eventually(lambda: page.robot()["holder"] is None, "a robot without a holder")
+        wait_for(lambda: page.robot()["holder"] is None, "a robot without a holder")
         # The robot was driven, so the new gate first sends zero.
-        eventually(lambda: fake.last_speed == 0, "a zero")
+        wait_for(lambda: fake.last_speed == 0, "a zero")
         page.drive_off(fake)
 
     def test_a_pending_request_to_a_killed_gate_is_answered_with_an_error(
         self, client, robot_spec
     ):
         client.declare(robot_spec)
-        eventually(lambda: client.ready, "a gate")
+        wait_for(lambda: client.ready, "a gate")
         os.kill(client.pid, signal.SIGSTOP)
         future = client.take("r1")
         os.kill(client.pid, signal.SIGKILL)
@@ -497,7 +496,7 @@ class TestLifecycle:
         page.drive_off(fake)
         client._supervisor.end_heartbeat()  # only the heartbeat ends
         at = time.monotonic()
-        zero = eventually(lambda: first_zero_after(fake, at), "a zero")
+        zero = wait_for(lambda: first_zero_after(fake, at), "a zero")
         assert zero - at <= 0.3 + JITTER
         moves = len(fake.moving)
         time.sleep(0.3)
@@ -510,9 +509,9 @@ class TestLifecycle:
         page.drive_off(fake)
         at = time.monotonic()
         os.kill(client.pid, number)
-        zero = eventually(lambda: first_zero_after(fake, at), "a zero")
+        zero = wait_for(lambda: first_zero_after(fake, at), "a zero")
         assert zero - at < 0.05 + JITTER
-        eventually(lambda: of(reports, protocol.GateDown), "its end")
+        wait_for(lambda: of(reports, protocol.GateDown), "its end")
 
     def test_a_second_gate_on_this_computer_shows_the_robot_but_cannot_drive(
         self, client, page, robot_spec
@@ -522,11 +521,11 @@ class TestLifecycle:
         second.start()
         second.declare(robot_spec)
         other = Page(second)
-        eventually(lambda: other.robot().get("reason"), "a reason")
+        wait_for(lambda: other.robot().get("reason"), "a reason")
         assert not other.robot()["armable"]
-        eventually(lambda: "another WebMap" in other.robot()["reason"], "the reason")
+        wait_for(lambda: "another WebMap" in other.robot()["reason"], "the reason")
         client.forget("r1")
-        eventually(lambda: other.robot()["armable"], "the lock", 5.0)
+        wait_for(lambda: other.robot()["armable"], "the lock", 5.0)
         other.end()
         second.stop()
 
@@ -536,7 +535,7 @@ class TestLifecycle:
             client.declare(spec)
 
     def test_starting_the_client_twice_starts_one_gate(self, client):
-        eventually(lambda: client.ready, "a gate")
+        wait_for(lambda: client.ready, "a gate")
         pid = client.pid
         client.start()
         assert client.pid == pid
@@ -544,17 +543,17 @@ class TestLifecycle:
         client.stop()
         assert client.pid is None
         client.start()
-        eventually(lambda: client.ready, "a gate")
+        wait_for(lambda: client.ready, "a gate")
 
 
 class TestActiveStop:
     def test_a_stop_stays_active_after_the_gate_was_killed(self, page, client, fake):
         page.drive_off(fake)
         client.stop_robot("r1")
-        eventually(lambda: page.robot().get("latched"), "a report of the active STOP")
+        wait_for(lambda: page.robot().get("latched"), "a report of the active STOP")
         page.robots.clear()
         os.kill(client.pid, signal.SIGKILL)
-        eventually(lambda: page.robot().get("latched"), "the STOP of the first gate")
+        wait_for(lambda: page.robot().get("latched"), "the STOP of the first gate")
         assert page.robot()["state"] == "stopped"
         assert page.robot()["stop"]["by"] == "program"
         at, moves = time.monotonic(), len(fake.moving)
@@ -564,13 +563,13 @@ class TestActiveStop:
         def refused(what):
             return [r["why"] for r in page.of("refused") if r["what"] == what]
 
-        assert "reset it first" in eventually(lambda: refused("take"), "a refusal")[-1]
-        eventually(lambda: first_zero_after(fake, at), "further zeros")
+        assert "reset it first" in wait_for(lambda: refused("take"), "a refusal")[-1]
+        wait_for(lambda: first_zero_after(fake, at), "further zeros")
         page.send(op="reset", robot="r1")
-        eventually(lambda: page.robot().get("armable") or refused("reset"), "an answer")
+        wait_for(lambda: page.robot().get("armable") or refused("reset"), "an answer")
         if refused("reset"):  # the display has repeated its STOP to the new gate
             page.send(op="reset", robot="r1")
-        eventually(lambda: page.robot().get("armable"), "a free robot")
+        wait_for(lambda: page.robot().get("armable"), "a free robot")
         assert len(fake.moving) == moves
         page.x = 0.0
         page.drive_off(fake)
@@ -586,18 +585,18 @@ class TestActiveStop:
         def latched():
             return [r for r in of(seen, protocol.RobotReport) if r.latched]
 
-        eventually(latched, "a report of the active STOP")
+        wait_for(latched, "a report of the active STOP")
         client.stop()
         seen.clear()
         client.start()
-        eventually(latched, "the earlier STOP")
+        wait_for(latched, "the earlier STOP")
 
         def reset():
             # The new gate may receive the STOP again, which then has a new identity.
             client.reset("r1", latched()[-1].stop.id)
             return not of(seen, protocol.RobotReport)[-1].latched
 
-        eventually(reset, "the reset")
+        wait_for(reset, "the reset")
 
     def test_a_stop_is_confirmed_only_when_odometry_shows_standstill(
         self, page, client, fake
@@ -608,10 +607,10 @@ class TestActiveStop:
         def confirmed():
             return (page.robot().get("stop") or {}).get("confirmed")
 
-        eventually(lambda: confirmed() is False, "a report of motion")
+        wait_for(lambda: confirmed() is False, "a report of motion")
         assert page.robot()["stop"]["why"].startswith("still moving at 0.1")
         fake.at_rest = True
-        eventually(confirmed, "a confirmed STOP")
+        wait_for(confirmed, "a confirmed STOP")
 
     def test_a_stop_stays_active_for_a_robot_that_is_removed_and_declared_again(
         self, page, client, robot_spec, fake
@@ -619,16 +618,16 @@ class TestActiveStop:
         page.drive_off(fake)
         pid = client.pid
         client.stop_robot("r1")
-        eventually(lambda: page.robot().get("latched"), "a report of the active STOP")
+        wait_for(lambda: page.robot().get("latched"), "a report of the active STOP")
         at = time.monotonic()  # then a removal takes effect at once
-        eventually(lambda: fake.velocities[-1][0] - at > 0.6, "further zeros")
+        wait_for(lambda: fake.velocities[-1][0] - at > 0.6, "further zeros")
         client.forget("r1")
-        eventually(lambda: page.of("gone"), "the end of the robot")
+        wait_for(lambda: page.of("gone"), "the end of the robot")
         page.robots.clear()
         client.declare(robot_spec)
-        eventually(lambda: page.robot().get("latched"), "the earlier STOP")
+        wait_for(lambda: page.robot().get("latched"), "the earlier STOP")
         fake.at_rest = True
-        eventually(lambda: (page.robot()["stop"] or {}).get("confirmed"), "standstill")
+        wait_for(lambda: (page.robot()["stop"] or {}).get("confirmed"), "standstill")
         assert client.pid == pid
 
     def test_a_reset_without_a_running_gate_raises_no_error(self):
@@ -644,21 +643,21 @@ class TestActiveStop:
         spec = msgspec.structs.replace(robot_spec, stop_hooks=hooks, action="/go")
         client.declare(spec)
         page = Page(client)
-        eventually(lambda: page.robot().get("armable"), "a link")
+        wait_for(lambda: page.robot().get("armable"), "a link")
         page.send(op="stop", robot="r1")
 
         def flags():
             return [t.message["msg"]["data"] for t in fake.of("publish", "/lock")]
 
-        eventually(lambda: flags() == [True], "the flag")
+        wait_for(lambda: flags() == [True], "the flag")
 
         def called():
             return {t.message["service"] for t in fake.of("call_service")}
 
-        eventually(lambda: "/e_stop" in called(), "the call")
+        wait_for(lambda: "/e_stop" in called(), "the call")
         assert "/go/_action/cancel_goal" in called()
         page.send(op="reset", robot="r1")
-        eventually(lambda: flags() == [True, False], "the cleared flag")
+        wait_for(lambda: flags() == [True, False], "the cleared flag")
         page.end()
         client.forget("r1")
 
@@ -668,13 +667,13 @@ class TestInputs:
         other = Page(client, "Ben")
         page.drive_off(fake)
         other.send(op="ask", robot="r1")
-        eventually(lambda: page.robot().get("asker"), "the request for control")
+        wait_for(lambda: page.robot().get("asker"), "the request for control")
         page.send(op="grant", robot="r1")
-        eventually(lambda: page.robot().get("changing"), "the change")
+        wait_for(lambda: page.robot().get("changing"), "the change")
         page.x = None
         assert not other.robot()["mine"]
         fake.at_rest = True
-        eventually(lambda: other.robot().get("mine"), "the lease")
+        wait_for(lambda: other.robot().get("mine"), "the lease")
         other.end()
 
     def test_a_stop_test_measures_the_command_timeout_and_keeps_the_result(
@@ -686,22 +685,22 @@ class TestInputs:
         fake.at_rest = True
         page.take()
         page.x = 0.0
-        eventually(lambda: page.robot().get("measured"), "odometry")
-        eventually(lambda: page.robot().get("armed"), "an armed driver")
+        wait_for(lambda: page.robot().get("measured"), "odometry")
+        wait_for(lambda: page.robot().get("armed"), "an armed driver")
         page.send(op="stop-test", robot="r1")
-        eventually(lambda: fake.moving, "creeping")
+        wait_for(lambda: fake.moving, "creeping")
         assert fake.moving[0][1] == 0.1
         fake.at_rest = False
 
         def state():
             return (page.robot().get("test") or {}).get("state")
 
-        eventually(lambda: state() == "waiting", "silence")
+        wait_for(lambda: state() == "waiting", "silence")
         fake.at_rest = True
-        eventually(lambda: state() == "done", "the result")
-        eventually(lambda: page.robot()["stop_source"] == "tested", "the date")
+        wait_for(lambda: state() == "done", "the result")
+        wait_for(lambda: page.robot()["stop_source"] == "tested", "the date")
         assert page.robot()["stop_time"] < 2
         client.stop()
         client.start()
-        eventually(lambda: page.robot().get("stop_date"), "the earlier result")
+        wait_for(lambda: page.robot().get("stop_date"), "the earlier result")
         page.end()

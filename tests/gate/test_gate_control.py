@@ -4,8 +4,9 @@ import asyncio
 import json
 
 import pytest
-from link_bench import PONG, frame, in_loop, noting_bridge, raw_bridge, until
+from link_bench import PONG, frame, in_loop, noting_bridge, raw_bridge
 
+from equipment.waiting import until
 from webmap.base.geometry import Twist
 from webmap.gate.clock import now
 from webmap.gate.events import EchoReceived, Key, LinkDown, LinkUp, PingAnswered

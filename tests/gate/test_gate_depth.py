@@ -5,8 +5,9 @@ import struct
 
 import cbor2
 import pytest
-from link_bench import TEXT, Received, frame, in_loop, raw_bridge, until
+from link_bench import TEXT, Received, frame, in_loop, raw_bridge
 
+from equipment.waiting import until
 from webmap.base.errors import ProtocolError
 from webmap.gate import pipe, protocol
 from webmap.gate.actions import SendGoal

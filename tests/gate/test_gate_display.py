@@ -6,9 +6,9 @@ import threading
 
 import msgspec
 import pytest
-from gate_robot import eventually
 
 from equipment.gate_harness import Bench, spec
+from equipment.waiting import wait_for
 from webmap.base.errors import ConfigError, MotionError, NoLease
 from webmap.base.geometry import Twist
 from webmap.gate import commands, protocol
@@ -79,7 +79,7 @@ def client(made):
 
 @pytest.fixture
 def gate(client, made):
-    gate = eventually(lambda: client.pid and made[0], "a gate")
+    gate = wait_for(lambda: client.pid and made[0], "a gate")
     gate.deliver(protocol.Ready(1), protocol.Tick(7, {}))
     return gate
 
@@ -445,8 +445,8 @@ class TestPages:
         page.receive(text)
         assert list(client._pending_stops) == [(page.id, robot)]
         gate.die()
-        second = eventually(lambda: client.pid and made[1], "a second gate")
-        eventually(lambda: second.of(protocol.FromPage), "the STOP")
+        second = wait_for(lambda: client.pid and made[1], "a second gate")
+        wait_for(lambda: second.of(protocol.FromPage), "the STOP")
         (again,) = second.of(protocol.FromPage)
         assert json.loads(again.text) == {"op": "stop", "robot": robot or "*"}
 
@@ -456,7 +456,7 @@ class TestPages:
         page.receive('{"op":"stop","robot":"r1"}')
         client.forget("r1")
         gate.die()
-        second = eventually(lambda: client.pid and made[1], "a second gate")
+        second = wait_for(lambda: client.pid and made[1], "a second gate")
         assert second.of(protocol.FromPage) == []
 
 
@@ -472,7 +472,7 @@ class TestLifecycle:
         client.forget("r2")
         assert len(gate.of(protocol.Forget)) == 1
         gate.die()
-        second = eventually(lambda: client.pid and made[1], "a second gate")
+        second = wait_for(lambda: client.pid and made[1], "a second gate")
         assert [one.id for one in second.of(protocol.RobotSpec)] == ["r1"]
         assert second.of(protocol.Connect)
         assert second.of(protocol.Speeds)
@@ -495,7 +495,7 @@ class TestLifecycle:
 
     def test_a_gate_that_sends_nothing_is_killed(self, client, gate, monkeypatch):
         monkeypatch.setattr(supervisor, "HUNG", 2)
-        eventually(lambda: gate.killed, "the kill of the gate")
+        wait_for(lambda: gate.killed, "the kill of the gate")
         assert gate.killed[0] == "it does not respond"
 
     def test_a_listener_receives_reports_until_removed(self, client, gate, caplog):

@@ -5,8 +5,8 @@ import time
 
 import pytest
 from gate_page import Page
-from gate_robot import eventually
 
+from equipment.waiting import wait_for
 from webmap.base.errors import NoLease
 from webmap.core.runtime import Runtime
 from webmap.gate import protocol
@@ -52,7 +52,7 @@ def failing(broken, reports, robot_spec, state_folder, monkeypatch):
     client.on_report(reports.append)
     client.declare(robot_spec)
     client.start()
-    eventually(lambda: downs(reports) and downs(reports)[-1].failing, "trouble")
+    wait_for(lambda: downs(reports) and downs(reports)[-1].failing, "trouble")
     yield client
     client.stop()
 
@@ -69,7 +69,7 @@ def mend(broken, monkeypatch, state_folder):
 def test_a_failing_gate_is_restarted_at_growing_intervals(failing, broken):
     begun = time.monotonic()
     before = broken.starts
-    eventually(lambda: broken.starts >= before + 3, "three more starts")
+    wait_for(lambda: broken.starts >= before + 3, "three more starts")
     # The waits after the second start: 0.25, 0.5, 1 and 2 s; one may have passed.
     assert time.monotonic() - begun > 1.2
 
@@ -98,9 +98,9 @@ def test_a_stop_pressed_without_a_gate_is_active_when_a_gate_runs(
         page.end()
         page = Page(failing)
     before = broken.starts
-    eventually(lambda: broken.starts > before, "another gate that ends")
+    wait_for(lambda: broken.starts > before, "another gate that ends")
     mend(broken, monkeypatch, state_folder)
-    stop = eventually(lambda: page.robot().get("stop"), "an active STOP")
+    stop = wait_for(lambda: page.robot().get("stop"), "an active STOP")
     assert stop["by"] == ("Ann" if by == "a page" else "program")
     page.end()
 
@@ -109,7 +109,7 @@ def test_a_repaired_gate_is_reported_as_running_and_drives(
     failing, broken, reports, monkeypatch, state_folder, fake
 ):
     mend(broken, monkeypatch, state_folder)
-    eventually(lambda: isinstance(reports[-1], protocol.RobotReport), "a gate")
+    wait_for(lambda: isinstance(reports[-1], protocol.RobotReport), "a gate")
     assert any(isinstance(report, protocol.GateUp) for report in reports)
     page = Page(failing)
     page.drive_off(fake)
@@ -123,7 +123,7 @@ def test_a_gate_program_that_cannot_be_started_is_reported(
     client = GateClient()
     client.on_report(reports.append)
     client.start()
-    eventually(lambda: downs(reports) and downs(reports)[-1].failing, "trouble")
+    wait_for(lambda: downs(reports) and downs(reports)[-1].failing, "trouble")
     assert "No such file" in downs(reports)[-1].why
     client.stop()
 
@@ -142,7 +142,7 @@ def test_a_viewer_receives_the_reason_why_the_gate_does_not_start(broken):
     runtime.start()
     try:
         runtime.call(runtime.watch, Viewer())
-        received = eventually(lambda: Viewer.notices, "a notice")
+        received = wait_for(lambda: Viewer.notices, "a notice")
     finally:
         runtime.stop()
     assert received[0].startswith("The gate does not start: ModuleNotFoundError: ")

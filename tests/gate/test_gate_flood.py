@@ -16,9 +16,9 @@ from link_bench import (
     noting_bridge,
     noting_lane,
     raw_bridge,
-    until,
 )
 
+from equipment.waiting import until
 from webmap.base.errors import BridgeClosed
 from webmap.gate.lanes import budget, sockets
 from webmap.gate.lanes import lane as waits

@@ -3,9 +3,10 @@
 import json
 
 import pytest
-from link_bench import frame, in_loop, noting_bridge, raw_bridge, until
+from link_bench import frame, in_loop, noting_bridge, raw_bridge
 
 from equipment.gate_harness import KEY, URL, Bench, spec
+from equipment.waiting import until
 from webmap.gate import actions, events, protocol
 from webmap.gate.display import pages
 from webmap.gate.lanes import calls, navigation

@@ -5,9 +5,10 @@ import time
 
 import cbor2
 import pytest
-from link_bench import in_loop, noting_bridge, until
+from link_bench import in_loop, noting_bridge
 
 from equipment.gate_harness import KEY, Bench, spec
+from equipment.waiting import until
 from webmap.base.geometry import Twist
 from webmap.gate.clock import now
 from webmap.gate.events import LinkUp, OdometryReceived, ScanReceived

@@ -11,9 +11,9 @@ from link_bench import (
     noting_bridge,
     noting_lane,
     raw_bridge,
-    until,
 )
 
+from equipment.waiting import until
 from webmap.gate.lanes import lane as lanes
 from webmap.gate.lanes import lane as waits
 from webmap.gate.lanes.sockets import SocketHandlers

@@ -3,10 +3,14 @@
 import contextlib
 import time
 
-from gate_robot import eventually
+import pytest
 
+from equipment.waiting import wait_for
 from webmap.base.errors import NoLease
 from webmap.base.geometry import Twist
+
+# The gate drives the robot in real time; a delayed process loses control.
+pytestmark = pytest.mark.serial
 
 
 def test_a_fast_program_leaves_only_a_few_velocities_on_a_stalled_link(
@@ -15,7 +19,7 @@ def test_a_fast_program_leaves_only_a_few_velocities_on_a_stalled_link(
     client.declare(robot_spec)
     reports = []
     client.on_report(reports.append)
-    eventually(lambda: any(getattr(r, "armable", 0) for r in reports), "a robot")
+    wait_for(lambda: any(getattr(r, "armable", 0) for r in reports), "a robot")
     client.take("r1").result(5)
 
     def push():
@@ -29,7 +33,7 @@ def test_a_fast_program_leaves_only_a_few_velocities_on_a_stalled_link(
             client.take("r1").result(5)
         return len(fake.moving) > 20
 
-    eventually(under_way, "a robot that moves")
+    wait_for(under_way, "a robot that moves")
     fake.hold()
     held_at = time.monotonic()
     before = len(fake.moving)
@@ -38,13 +42,13 @@ def test_a_fast_program_leaves_only_a_few_velocities_on_a_stalled_link(
         push()
         return time.monotonic() - held_at > 0.6
 
-    eventually(stalled, "the time after which the gate notices the stall")
+    wait_for(stalled, "the time after which the gate notices the stall")
     fake.go_on()
 
     def stopped():
         late = any(at > held_at + 0.5 for at, _ in fake.velocities)
         return late and fake.last_speed == 0
 
-    eventually(stopped, "a zero after the stall")
+    wait_for(stopped, "a zero after the stall")
     # One more may have been read while the robot stopped reading.
     assert len(fake.moving) - before <= 6 + 1

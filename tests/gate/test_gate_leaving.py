@@ -6,7 +6,8 @@ import pytest
 from link_bench import in_loop
 
 from equipment.gate_harness import spec
-from equipment.hanging_bridge import hanging_bridge, until
+from equipment.hanging_bridge import hanging_bridge
+from equipment.waiting import until
 from webmap.gate.actions import SendGoal
 from webmap.gate.events import EchoReceived, Key, LinkUp
 from webmap.gate.lanes.calls import ServiceCalls

@@ -1,8 +1,9 @@
 """The lanes that robots need to their bridges, and the actions over the lanes."""
 
-from link_bench import in_loop, noting_bridge, until
+from link_bench import in_loop, noting_bridge
 
 from equipment.gate_harness import spec
+from equipment.waiting import until
 from webmap.base.geometry import Twist
 from webmap.gate import actions
 from webmap.gate.clock import now

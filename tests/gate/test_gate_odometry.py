@@ -1,8 +1,9 @@
 """The witness lane: odometry and scans for the machines that are watched."""
 
 import cbor2
-from link_bench import in_loop, noting_bridge, until
+from link_bench import in_loop, noting_bridge
 
+from equipment.waiting import until
 from webmap.base.geometry import Twist
 from webmap.gate.events import Key, LinkDown, LinkUp, OdometryReceived, ScanReceived
 from webmap.gate.lanes.odometry import OdometryLane

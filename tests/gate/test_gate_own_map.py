@@ -6,10 +6,10 @@ import time
 import msgspec
 import pytest
 from gate_page import Page
-from gate_robot import eventually
 from hypothesis import given
 from hypothesis import strategies as st
 
+from equipment.waiting import wait_for
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Pose
 from webmap.gate.actions import SendGoal, SendPose
@@ -76,16 +76,14 @@ def test_a_goal_from_a_page_arrives_in_the_own_map_of_the_robot(
         return fake.of("publish", topic)
 
     for topic, op in (("/initialpose", "locate"), ("/goal", "goal")):
-        message = eventually(lambda t=topic, o=op: received(t, o), f"the {op}")[
-            0
-        ].message
+        message = wait_for(lambda t=topic, o=op: received(t, o), f"the {op}")[0].message
         pose = message["msg"]["pose"]
         pose = pose.get("pose", pose)
         place, turn = pose["position"], pose["orientation"]
         assert (place["x"], place["y"]) == pytest.approx((2.0, 9.0))
         yaw = 2 * math.atan2(turn["z"], turn["w"])
         assert yaw == pytest.approx(-QUARTER)
-    eventually(lambda: page.robot().get("goal"), "the report")
+    wait_for(lambda: page.robot().get("goal"), "the report")
     shown = page.robot()["goal"]
     assert (shown["x"], shown["y"], shown["yaw"]) == (1.0, 2.0, 0.0), "the common map"
     page.end()

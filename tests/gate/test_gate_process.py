@@ -9,8 +9,8 @@ import subprocess
 import threading
 
 import pytest
-from gate_robot import eventually
 
+from equipment.waiting import wait_for
 from webmap.base.processes import python_command
 from webmap.gate import pipe, process
 from webmap.gate.events import Shutdown
@@ -47,7 +47,7 @@ def messages_until_ready(gate):
         messages.extend(unpacker.feed(os.read(gate.stdout.fileno(), 1 << 16)))
         return messages
 
-    eventually(ready, "its first message", 60.0)
+    wait_for(ready, "its first message", 60.0)
     return messages
 
 

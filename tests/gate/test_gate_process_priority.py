@@ -4,10 +4,12 @@ import os
 import sys
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from pathlib import Path
 
 import pytest
-from gate_robot import eventually
 
+from equipment.waiting import wait_for
 from webmap.gate import process
 from webmap.gate.display.client import GateClient
 
@@ -23,9 +25,11 @@ def in_a_thread(fn):
 
 
 def policies_of_threads(pid):
-    return {
-        os.sched_getscheduler(int(thread)) for thread in os.listdir(f"/proc/{pid}/task")
-    }
+    policies = set()
+    for task in Path(f"/proc/{pid}/task").glob("*"):
+        with suppress(ProcessLookupError):  # the thread has just ended
+            policies.add(os.sched_getscheduler(int(task.name)))
+    return policies
 
 
 @linux
@@ -69,14 +73,14 @@ def test_the_priority_is_not_changed_on_other_systems_than_linux(monkeypatch):
 @linux
 def test_all_gate_threads_have_realtime_priority_but_the_display_does_not():
     may = in_a_thread(process.rise)
-    (usual,) = policies_of_threads(os.getpid())  # the tests may be idle work
+    usual = os.sched_getscheduler(0)  # the tests may be idle work
     client = GateClient()
     client.start()
     try:
-        eventually(lambda: client.ready, "a gate")
-        pid = client.pid
+        wait_for(lambda: client.ready, "a gate")
         wanted = {os.SCHED_RR if may else usual}
-        eventually(lambda: policies_of_threads(pid) == wanted, "its priority")
-        assert policies_of_threads(os.getpid()) == {usual}
+        wait_for(lambda: policies_of_threads(client.pid) == wanted, "its priority")
+        # The thread that was raised above may still be ending.
+        wait_for(lambda: os.SCHED_RR not in policies_of_threads(os.getpid()), "its end")
     finally:
         client.stop()

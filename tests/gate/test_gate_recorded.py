@@ -7,8 +7,8 @@ import time
 import msgspec
 import pytest
 from gate_page import Page
-from gate_robot import eventually
 
+from equipment.waiting import wait_for
 from webmap.gate.display.client import GateClient
 from webmap.gate.rules.motion import DEADMAN
 from webmap.testing import (
@@ -80,7 +80,7 @@ def press(page, reached, what):
         page.x = 1.0 if page.robot()["armed"] else 0.0
         return reached()
 
-    eventually(under_way, what, 30)
+    wait_for(under_way, what, 30)
 
 
 @pytest.mark.parametrize("forged", [(), ("epoch", "seq")])
@@ -102,12 +102,12 @@ def test_replayed_commands_of_an_old_session_do_not_move_the_robot(
             json.dumps(command | {name: now[name] for name in forged})
         )
         witness_has_time = time.monotonic() + 0.05
-        eventually(lambda until=witness_has_time: time.monotonic() > until, "50 ms")
+        wait_for(lambda until=witness_has_time: time.monotonic() > until, "50 ms")
     assert not moving(witness, before)
     other.x = 0.0
-    eventually(lambda: other.robot()["armed"], "released inputs")
+    wait_for(lambda: other.robot()["armed"], "released inputs")
     other.x = 1.0
-    eventually(lambda: moving(witness, before), "motion by its own commands")
+    wait_for(lambda: moving(witness, before), "motion by its own commands")
     other.end()
 
 
@@ -121,7 +121,7 @@ def test_a_robot_does_not_accelerate_faster_than_its_limit(driven, witness):
             "speed",
         )
         page.x = 0.0
-        eventually(lambda: witness.log.twists[-1].is_zero, "a zero at once")
+        wait_for(lambda: witness.log.twists[-1].is_zero, "a zero at once")
         slack = 0.1 + sentinel.worst(0.0)
     wrong = check_invariants(
         witness.log.twists, Bounds(V_MAX, 1.5, a_max=0.4, slack=slack)
@@ -172,6 +172,6 @@ def test_a_page_connection_slower_than_300_ms_does_not_move_the_robot(driven, wi
     for x in (0.0, 1.0):
         page.x = x
         count = len(page.sent)
-        eventually(lambda until=count + 40: len(page.sent) > until, "two seconds", 30)
+        wait_for(lambda until=count + 40: len(page.sent) > until, "two seconds", 30)
     assert any(command.get("x") for command in page.sent)
     assert not moving(witness)

@@ -5,13 +5,10 @@ import itertools
 import json
 
 import pytest
-from link_bench import (
-    in_loop,
-    noting_bridge,
-    until,
-)
+from link_bench import in_loop, noting_bridge
 
 from equipment.gate_harness import KEY, URL, ZERO, Bench, spec
+from equipment.waiting import until
 from webmap.base.geometry import Twist
 from webmap.gate import actions, commands, events, protocol
 from webmap.gate.events import Key

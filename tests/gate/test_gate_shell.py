@@ -5,9 +5,10 @@ import contextlib
 import json
 
 import pytest
-from link_bench import in_loop, noting_bridge, until
+from link_bench import in_loop, noting_bridge
 
 from equipment.gate_harness import spec
+from equipment.waiting import polls, until
 from webmap.gate import actions, commands, events, process, protocol
 from webmap.gate.disk import UNKNOWN, Disk, Records, path_of
 from webmap.gate.events import Key, Press
@@ -90,9 +91,9 @@ class Running:
 
     async def drive_off(self, bridge):
         """Drive; on a busy machine the gate may end control, so take it again then."""
-        deadline = asyncio.get_running_loop().time() + 30.0
-        while not any(speeds(bridge)):
-            assert asyncio.get_running_loop().time() < deadline, "no motion"
+        for _ in polls("motion", 30.0, 1.0):
+            if any(speeds(bridge)):
+                return
             await self.reported(lambda r: r.armable or r.holder, "a robot to drive")
             if self.report().holder is None:
                 self.send(op="take", robot="r1")

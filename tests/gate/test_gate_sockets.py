@@ -18,11 +18,11 @@ from link_bench import (
     in_loop,
     noting_bridge,
     raw_bridge,
-    until,
 )
 from websockets.asyncio.server import serve
 from websockets.client import ClientProtocol
 
+from equipment.waiting import until
 from webmap.base.errors import BridgeClosed
 from webmap.gate.lanes import sockets
 from webmap.gate.lanes.budget import Budget

@@ -11,9 +11,9 @@ import shutil
 import msgspec
 import pytest
 from gate_page import Page
-from gate_robot import eventually
 from stored_robots import FOLDER, IDENTITIES, PORT, ROBOTS, STOPPED, TESTED
 
+from equipment.waiting import wait_for
 from webmap.gate import actions, events, process
 from webmap.gate.disk import UNKNOWN, Disk, Records
 from webmap.gate.display.client import GateClient
@@ -39,7 +39,7 @@ def new_gate():
     for spec in ROBOTS:
         client.declare(spec)
     page = Page(client)
-    eventually(lambda: len(page.robots) == len(ROBOTS), "a report of each robot")
+    wait_for(lambda: len(page.robots) == len(ROBOTS), "a report of each robot")
     yield page
     page.end()
     client.stop()
@@ -88,10 +88,10 @@ def test_a_reset_deletes_a_stored_stop_file_and_a_new_stop_gets_the_same_file_na
     with new_gate() as page:
         for name in STOPPED:
             page.send(op="reset", robot=name.lower())
-        eventually(lambda: not stops(), "a folder without STOPs")
+        wait_for(lambda: not stops(), "a folder without STOPs")
         for name in STOPPED:
             page.send(op="stop", robot=name.lower())
-        eventually(lambda: stops() == before, "a file for each STOP")
+        wait_for(lambda: stops() == before, "a file for each STOP")
 
 
 class Links:

@@ -7,8 +7,8 @@ import sys
 import threading
 
 import pytest
-from gate_robot import eventually
 
+from equipment.waiting import wait_for
 from webmap.gate import pipe
 from webmap.gate.display import supervisor as supervisor_module
 from webmap.gate.display.supervisor import GateProcess
@@ -60,7 +60,7 @@ def test_messages_are_sent_and_received_complete_and_in_order(run):
     mirror = run("/bin/cat")
     mirror.child.send(Ready(1), Ready(2))
     mirror.child.send(Tick(3, {}))
-    eventually(lambda: len(mirror.on_echo) == 3, "all messages")
+    wait_for(lambda: len(mirror.on_echo) == 3, "all messages")
     assert mirror.on_echo == [Ready(1), Ready(2), Tick(3, {})]
     assert mirror.child.pid > 0
 
@@ -78,7 +78,7 @@ def test_the_last_line_of_stderr_is_the_end_reason_and_all_lines_are_passed_on(
     run, capfd
 ):
     gate = run(*shell("echo first >&2; echo 'no such module' >&2; echo >&2; exit 3"))
-    eventually(lambda: gate.ends, "its end")
+    wait_for(lambda: gate.ends, "its end")
     gate.child.stop(30.0)
     assert gate.child.end_reason == "no such module"
     assert capfd.readouterr().err == "first\nno such module\n\n"
@@ -86,7 +86,7 @@ def test_the_last_line_of_stderr_is_the_end_reason_and_all_lines_are_passed_on(
 
 def test_control_characters_in_stderr_are_escaped(run, capfd):
     gate = run(*shell(r"printf 'ValueError: \033[2J\r\302\233 \377\n' >&2; exit 3"))
-    eventually(lambda: gate.ends, "its end")
+    wait_for(lambda: gate.ends, "its end")
     gate.child.stop(30.0)
     assert gate.child.end_reason == r"ValueError: \x1b[2J\r\x9b �"
     assert capfd.readouterr().err == "ValueError: \\x1b[2J\\r\\x9b �\n"
@@ -94,7 +94,7 @@ def test_control_characters_in_stderr_are_escaped(run, capfd):
 
 def test_the_end_reason_of_a_killed_process_names_the_signal(run):
     gate = run(*shell("kill -9 $$"))
-    eventually(lambda: gate.ends, "its end")
+    wait_for(lambda: gate.ends, "its end")
     gate.child.stop(30.0)
     assert gate.child.end_reason == "ended by SIGKILL"
 
@@ -116,7 +116,7 @@ def test_a_process_that_does_not_read_is_ended_when_its_unsent_data_is_too_large
     assert gate.ends == [], "the process may only be slow so far"
     monkeypatch.setattr(supervisor_module, "MAX_UNSENT", 1 << 16)
     gate.child.send(RefusedCount("a", 1, text))
-    eventually(lambda: gate.ends, "its end")
+    wait_for(lambda: gate.ends, "its end")
     assert "it does not read its pipe" in caplog.text
 
 
@@ -134,20 +134,20 @@ def test_unread_messages_are_delivered_later_and_in_order(run):
         mirror.child.send()  # as the next heartbeat does
         return len(mirror.on_echo) == len(sent)
 
-    eventually(through, "all messages")
+    wait_for(through, "all messages")
     assert mirror.on_echo == sent
 
 
 def test_sending_to_an_ended_process_drops_the_message(run):
     gate = run("/bin/true")
-    eventually(lambda: gate.ends, "its end")
+    wait_for(lambda: gate.ends, "its end")
     gate.child.send(Ready(1))
     assert not gate.child._unsent
 
 
 def test_a_process_that_sends_invalid_data_is_killed(run, caplog):
     gate = run(*shell(r"printf '\377\377\377\377'; exec sleep 600"))
-    eventually(lambda: gate.ends, "its end")
+    wait_for(lambda: gate.ends, "its end")
     gate.child.stop(30.0)
     assert gate.child.end_reason == "ended by SIGKILL"
     assert "a message of 4294967295 bytes" in caplog.text
@@ -194,4 +194,4 @@ def test_the_ended_callback_may_stop_the_process():
 
     gate = GateProcess(lambda *_: None, ended, shell("echo 'full disk' >&2; exit 1"))
     gate.start()
-    eventually(lambda: reasons == ["full disk"], "the reason")
+    wait_for(lambda: reasons == ["full disk"], "the reason")

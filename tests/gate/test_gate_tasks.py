@@ -3,9 +3,10 @@
 import json
 
 import pytest
-from link_bench import in_loop, noting_bridge, until
+from link_bench import in_loop, noting_bridge
 
 from equipment.gate_harness import spec
+from equipment.waiting import until
 from webmap.gate.actions import SendGoal, SendPose
 from webmap.gate.events import GoalEnded, GoalLost, GoalProgress, Key, LinkDown, LinkUp
 from webmap.gate.lanes import tasks

@@ -6,9 +6,9 @@ import time
 
 import pytest
 from gate_page import Page
-from gate_robot import eventually
 
 from equipment.gate_harness import KEY, URL, ZERO, Bench, spec
+from equipment.waiting import wait_for
 from webmap.gate import actions
 from webmap.gate.disk import Disk, Records
 from webmap.gate.display.client import GateClient
@@ -276,15 +276,15 @@ def test_a_stop_on_another_gate_stops_the_driven_robot(client, page, robot_spec,
     second.declare(robot_spec)
     other = Page(second, name="Ben")
     reason = "another WebMap on this computer uses this robot"
-    eventually(lambda: other.robot().get("reason") == reason, "the other's reason")
+    wait_for(lambda: other.robot().get("reason") == reason, "the other's reason")
     other.send(op="stop", robot="r1")
     at = time.monotonic()
-    eventually(lambda: page.robot()["latched"], "a STOP here")
+    wait_for(lambda: page.robot()["latched"], "a STOP here")
     assert page.robot()["stop"]["by"] == "Ben"
-    eventually(lambda: other.robot()["latched"], "a STOP there")
+    wait_for(lambda: other.robot()["latched"], "a STOP there")
     assert all(moved < at + 1.0 for moved, _ in fake.moving)
     page.send(op="reset", robot="r1")
-    eventually(lambda: not page.robot()["latched"], "no STOP here")
-    eventually(lambda: not other.robot()["latched"], "no STOP there")
+    wait_for(lambda: not page.robot()["latched"], "no STOP here")
+    wait_for(lambda: not other.robot()["latched"], "no STOP there")
     other.end()
     second.stop()

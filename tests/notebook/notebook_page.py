@@ -3,11 +3,12 @@
 import base64
 import json
 import queue
-import time
 from collections.abc import Callable
 
 from fake_comm import FakeComm
 from playwright.sync_api import Page
+
+from equipment.waiting import polls
 
 HOST = """
 (esm) => {
@@ -112,9 +113,9 @@ class NotebookPage:
 
     def until(self, condition: Callable[[], object]) -> None:
         """Carry messages until a condition is true."""
-        deadline = time.monotonic() + 20
-        while not condition():
-            assert time.monotonic() < deadline, condition
+        for _ in polls("the condition"):
+            if condition():
+                return
             self.carry()
 
     def count(self, selector: str) -> int:

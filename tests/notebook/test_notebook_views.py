@@ -9,6 +9,7 @@ import pytest
 from fake_comm import FakeComm, request
 
 import webmap
+from equipment.waiting import wait_for
 from webmap.base.errors import ConfigError
 from webmap.core.runtime import runtime
 from webmap.notebook import views as views_module
@@ -40,7 +41,7 @@ class Shown:
     def open(self, view: str = "a-view-1") -> webmap.Page:
         number = len(self.pages)
         self.send(HELLO, view)
-        until(lambda: len(self.pages) > number)
+        wait_for(lambda: len(self.pages) > number)
         return self.pages[-1]
 
     def settle(self) -> None:
@@ -54,13 +55,6 @@ class Shown:
         return messages
 
 
-def until(condition) -> None:
-    deadline = time.monotonic() + 10
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-
-
 @pytest.fixture
 def shown() -> Shown:
     return Shown()
@@ -69,7 +63,7 @@ def shown() -> Shown:
 def test_a_hello_opens_a_page_of_a_viewer_and_its_first_message_is_a_frame(shown):
     page = shown.open()
     assert page.viewer.role == "viewer"
-    until(lambda: not shown.comm.sent.empty())
+    wait_for(lambda: not shown.comm.sent.empty())
     content, buffers, _ = shown.received()[0]
     assert content["view"] == "a-view-1"
     assert len(buffers) == 1
@@ -134,21 +128,21 @@ def test_a_frame_is_sent_for_the_last_message_of_the_notebook(shown):
     request.reset(reset)
     shown.received()
     webmap.call(page.map.root.set, "data-step", "1")
-    until(lambda: not shown.comm.sent.empty())
+    wait_for(lambda: not shown.comm.sent.empty())
     assert shown.received()[0].sent_for == "an answer"
 
 
 def test_a_cleared_cell_closes_its_page_and_no_other(shown):
     first, second = shown.open("a-view-1"), shown.open("a-view-2")
     shown.comm.deliver({"view": "a-view-1"})
-    until(lambda: first.closed)
+    wait_for(lambda: first.closed)
     assert not second.closed
 
 
 def test_a_closed_widget_closes_all_its_pages(shown):
     pages = [shown.open("a-view-1"), shown.open("a-view-2")]
     shown.widget.close()
-    until(lambda: all(page.closed for page in pages))
+    wait_for(lambda: all(page.closed for page in pages))
 
 
 def test_the_view_that_was_silent_longest_yields_to_a_new_one(shown, monkeypatch):
@@ -156,19 +150,19 @@ def test_the_view_that_was_silent_longest_yields_to_a_new_one(shown, monkeypatch
     first, second = shown.open("a-view-1"), shown.open("a-view-2")
     shown.send({"op": "seen", "frame": 0}, "a-view-1")
     shown.open("a-view-3")
-    until(lambda: second.closed)
+    wait_for(lambda: second.closed)
     assert not first.closed
 
 
 def test_a_view_that_stays_silent_is_closed(shown, monkeypatch):
     monkeypatch.setattr(views_module, "SILENT_S", 0.2)
     page = shown.open()
-    until(lambda: page.closed)
+    wait_for(lambda: page.closed)
 
 
 def test_a_map_that_webmap_has_ended_opens_again_after_its_start(shown):
     page = shown.open()
-    until(lambda: not shown.comm.sent.empty())
+    wait_for(lambda: not shown.comm.sent.empty())
     webmap.stop()
     assert page.closed
     assert "ended" in shown.received()[-1].content
@@ -183,7 +177,7 @@ def test_nobody_looks_when_the_last_view_has_gone(shown):
     shown.open()
     assert runtime._watchers
     shown.comm.deliver({"view": "a-view-1"})
-    until(lambda: not runtime._watchers)
+    wait_for(lambda: not runtime._watchers)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from ros_facts import ROBOT
 from websockets.sync.client import connect
 
 from equipment.environment import outside
+from equipment.waiting import wait_for
 from webmap.testing import FaultProxy
 
 HERE = Path(__file__).parent
@@ -80,14 +81,16 @@ class Program:
 
     def wait_for(self, pattern, within=60.0):
         """Return the match in the first line that has one."""
-        deadline = time.monotonic() + within
-        while time.monotonic() < deadline:
+
+        def found():
             for line in list(self.lines):
                 if match := re.search(pattern, line):
                     return match
             assert self.popen.poll() is None, "".join(self.lines)
-            time.sleep(0.02)
-        raise AssertionError(f"no line with {pattern!r}, but:\n{''.join(self.lines)}")
+            return None
+
+        lines = lambda: f"{pattern!r} in:\n{''.join(self.lines)}"  # noqa: E731
+        return wait_for(found, lines, within)
 
     def end(self, sig=signal.SIGINT):
         self.popen.send_signal(sig)

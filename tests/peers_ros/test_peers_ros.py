@@ -27,7 +27,8 @@ from ros_facts import (
 )
 
 from equipment.chromium import hold
-from equipment.processes import WEB, matrix, running, wait_until
+from equipment.processes import WEB, matrix, running
+from equipment.waiting import wait_for
 
 # The first run installs ROS, which may take minutes.
 pytestmark = [
@@ -118,7 +119,7 @@ def expect_drawn_where_it_is(tab, ros):
         m = matrix(tab, BOB)
         return [m[0], m[1], m[4], m[5]]
 
-    wait_until(lambda: drawn() == here, what=f"drawing it at {x:.3f}, {y:.3f}")
+    wait_for(lambda: drawn() == here, what=f"drawing it at {x:.3f}, {y:.3f}")
 
 
 def test_the_robot_and_its_scan_are_drawn_at_the_positions_from_its_ros_nodes(opened):
@@ -140,14 +141,14 @@ def test_a_held_key_drives_the_robot_and_its_release_sends_zero(opened, ros):
     drive(opened, ros)
     opened.keyboard.up("w")
     released = time.monotonic()
-    wait_until(lambda: is_stopped(ros), what="zero")
+    wait_for(lambda: is_stopped(ros), what="zero")
     speeds = {t.speed for t in ros.twists() if not t.is_zero}
     assert 0.05 < max(speeds) <= 0.3 + 1e-9, "a base without a stated stop time is slow"
     assert min(speeds) > 0
     zero = next(t for t in ros.twists() if t.is_zero and t.at > released - SOON)
     assert zero.at - released < SOON
     expect_drawn_where_it_is(opened, ros)
-    wait_until(
+    wait_for(
         lambda: time.monotonic() - ros.twists()[-1].at > SOON,
         what="silence, so that other programs can publish,",
     )
@@ -163,10 +164,8 @@ def test_after_a_restart_of_the_bridge_the_robot_receives_zero_first(opened, ros
     expect(row).to_contain_text("No connection: may still be moving")
     opened.wait_for_timeout(500)  # the key is still held
     ros.start_bridge()
-    wait_until(
-        lambda: len(ros.twists()) > killed, within=20.0, what="the next velocity"
-    )
-    wait_until(lambda: is_stopped(ros), what="zero")
+    wait_for(lambda: len(ros.twists()) > killed, seconds=20.0, what="the next velocity")
+    wait_for(lambda: is_stopped(ros), what="zero")
     assert all(t.is_zero for t in ros.twists()[killed:]), (
         "the held key still drove the robot"
     )
@@ -177,7 +176,7 @@ def test_after_a_restart_of_the_bridge_the_robot_receives_zero_first(opened, ros
     expect_drawn_where_it_is(opened, ros)
     drive(opened, ros)
     opened.keyboard.up("w")
-    wait_until(lambda: is_stopped(ros), what="zero after the robot drove again")
+    wait_for(lambda: is_stopped(ros), what="zero after the robot drove again")
 
 
 def webmap(*arguments):
@@ -227,7 +226,7 @@ def test_a_fleet_file_from_a_topic_list_shows_the_map_published_earlier(
             [*CORNER, CORNER[0] + CELL * CELLS[0], CORNER[1] + CELL * CELLS[1]],
             abs=0.001,
         )
-        wait_until(lambda: box_in_world(room) == there, what="the room at its place")
+        wait_for(lambda: box_in_world(room) == there, what="the room at its place")
         tab.goto("about:blank")
 
 

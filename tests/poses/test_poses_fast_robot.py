@@ -5,7 +5,8 @@ import time
 
 import pytest
 
-from equipment.fake_rosbridge import bridged, until
+from equipment.fake_rosbridge import bridged
+from equipment.waiting import until
 from webmap import Robot
 from webmap.core.frame_pace import FramePace
 from webmap.poses.frames import PERIOD

@@ -8,6 +8,7 @@ import time
 import msgspec
 import pytest
 
+from equipment.waiting import until
 from webmap import Robot
 from webmap.base.scope import Removal
 from webmap.poses import silence
@@ -129,9 +130,7 @@ def log(caplog, monkeypatch):
 
 async def lines_of(log, count: int) -> None:
     """Wait for a number of lines."""
-    async with asyncio.timeout(10):
-        while len(log.messages) < count:
-            await asyncio.sleep(0.005)
+    await until(lambda: len(log.messages) >= count)
 
 
 def follow(robot, link, topic="/odom", type="nav_msgs/Odometry"):

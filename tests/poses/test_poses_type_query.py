@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from equipment.waiting import until
 from webmap import Bridge, Robot
 from webmap.base.scope import Removal
 from webmap.core.motion import RobotMotion
@@ -250,13 +251,9 @@ def test_a_rosapi_that_starts_after_rosbridge_is_asked_for_the_type(monkeypatch)
         robot = Robot("Bob")
         robot.set_twist_topic(bridge, "/cmd_vel")
         bridge.start(asyncio.get_running_loop())
-        async with asyncio.timeout(10):
-            while not answers:
-                await asyncio.sleep(0.01)
-            assert set(answers) == {None}
-            Rosapi(graph, quirks).start()
-            while robot.motion.spec().twist_type != STAMPED:
-                await asyncio.sleep(0.01)
+        assert set(await until(lambda: answers)) == {None}
+        Rosapi(graph, quirks).start()
+        await until(lambda: robot.motion.spec().twist_type == STAMPED)
         robot.destroy()
         await bridge.stop()
         await server.stop()

@@ -12,7 +12,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from equipment.server_fakes import wait_for
+from equipment.waiting import wait_for
 
 PAGE = Path(__file__).parents[2] / "docs/howto/service.md"
 

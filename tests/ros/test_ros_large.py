@@ -6,7 +6,8 @@ import json
 
 import pytest
 
-from equipment.fake_rosbridge import bridged, until
+from equipment.fake_rosbridge import bridged
+from equipment.waiting import until
 from webmap.base.scope import Scope
 from webmap.ros.bridge import Bridge
 from webmap.ros.rosbridge import wire_subscription

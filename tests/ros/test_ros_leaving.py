@@ -5,7 +5,8 @@ import asyncio
 import pytest
 
 from equipment.fake_rosbridge import bridged
-from equipment.hanging_bridge import hanging_bridge, until
+from equipment.hanging_bridge import hanging_bridge
+from equipment.waiting import until
 from webmap.ros.bridge import Bridge
 
 TYPES = {

@@ -9,7 +9,8 @@ from pathlib import Path
 import cbor2
 import pytest
 
-from equipment.fake_rosbridge import bridged, until
+from equipment.fake_rosbridge import bridged
+from equipment.waiting import until
 from webmap.base.scope import Scope
 from webmap.ros import limits, worker
 from webmap.ros.limits import (

@@ -10,7 +10,8 @@ import msgspec
 import pytest
 
 from equipment.captured_frames import CAPTURED
-from equipment.fake_rosbridge import bridged, until
+from equipment.fake_rosbridge import bridged
+from equipment.waiting import until
 from webmap.base.errors import ProtocolError
 from webmap.ros import offload, worker
 from webmap.ros.bridge import Bridge
@@ -36,7 +37,7 @@ ORIGIN = {
 
 def run(scenario):
     try:
-        asyncio.run(asyncio.wait_for(scenario(), 30))
+        asyncio.run(scenario())
         assert offload._shared is None
     finally:
         offload._shared = None  # for the next test

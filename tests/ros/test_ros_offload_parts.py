@@ -9,7 +9,7 @@ import cbor2
 import pytest
 from test_ros_limits import publish, transforms
 
-from equipment.fake_rosbridge import until
+from equipment.waiting import until
 from webmap.features.layers.diagnostics import DiagnosticArrayMsg
 from webmap.features.layers.marker_drawing import MarkerArrayMsg
 from webmap.ros import offload, worker
@@ -25,7 +25,7 @@ STEP = 0.1
 
 def run(scenario):
     try:
-        asyncio.run(asyncio.wait_for(scenario(), 60))
+        asyncio.run(scenario())
         assert offload._shared is None
     finally:
         offload._shared = None  # for the next test

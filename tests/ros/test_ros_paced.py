@@ -8,6 +8,7 @@ import time
 
 import pytest
 
+from equipment.waiting import until
 from webmap.ros.sockets.connection import BridgeConnection
 from webmap.ros.sockets.frame_reader import MOST_FRAGMENTS
 from webmap.testing import Sentinel
@@ -48,12 +49,6 @@ def lane(url, seen, ended=None):
         closed=(lambda why: None) if ended is None else ended.append,
         failed=lambda error: None,
     )
-
-
-async def until(check):
-    async with asyncio.timeout(30):
-        while not check():
-            await asyncio.sleep(0.005)
 
 
 @pytest.mark.serial

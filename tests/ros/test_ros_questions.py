@@ -4,7 +4,8 @@ import asyncio
 
 import pytest
 
-from equipment.fake_rosbridge import FakeRosbridge, bridged, until
+from equipment.fake_rosbridge import FakeRosbridge, bridged
+from equipment.waiting import until
 from webmap.base.errors import BridgeClosed, ConfigError, ServiceError
 from webmap.base.lifecycle import lifecycle
 from webmap.ros.bridge import Bridge

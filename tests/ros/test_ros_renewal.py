@@ -5,7 +5,8 @@ from itertools import pairwise
 
 import pytest
 
-from equipment.fake_rosbridge import bridged, until
+from equipment.fake_rosbridge import bridged
+from equipment.waiting import until
 from webmap.ros.rosbridge import wire_subscription
 from webmap.ros.rosbridge.wire_subscription import (
     AGAIN,

@@ -4,7 +4,8 @@ import asyncio
 
 import pytest
 
-from equipment.fake_rosbridge import FakeRosbridge, bridged, until
+from equipment.fake_rosbridge import FakeRosbridge, bridged
+from equipment.waiting import until
 from webmap.base.errors import BridgeClosed
 from webmap.base.lifecycle import Lifecycle
 from webmap.base.scope import Scope
@@ -14,7 +15,7 @@ from webmap.ros.callbacks import Callbacks
 
 
 def run(scenario):
-    asyncio.run(asyncio.wait_for(scenario(), 30))
+    asyncio.run(scenario())
 
 
 @pytest.fixture

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from equipment.fake_rosbridge import bridged, until
+from equipment.fake_rosbridge import bridged
+from equipment.waiting import until
 from webmap.base.errors import ProtocolError, ServiceError
 from webmap.discovery import discover
 from webmap.ros.decoding import decode_json

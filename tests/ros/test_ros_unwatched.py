@@ -4,7 +4,8 @@ import asyncio
 
 import pytest
 
-from equipment.fake_rosbridge import bridged, until
+from equipment.fake_rosbridge import bridged
+from equipment.waiting import until
 from webmap.base.audience import audience
 from webmap.base.errors import ConfigError
 from webmap.ros.bridge import Bridge

@@ -7,8 +7,9 @@ from collections import Counter
 from contextlib import suppress
 
 import pytest
-from test_ros_paced import bridge, until
+from test_ros_paced import bridge
 
+from equipment.waiting import until
 from webmap import Bridge
 from webmap.ros.messages import LaserScanMsg, OdometryMsg
 

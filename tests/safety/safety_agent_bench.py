@@ -18,9 +18,10 @@ import time
 from contextlib import ExitStack
 from pathlib import Path
 
-from safety_bench import pass_time, wait_for
+from safety_bench import pass_time
 
 from equipment.processes import Process
+from equipment.waiting import wait_for
 from webmap.core.motion import id_at_agent
 from webmap.testing import FaultProxy, Sentinel, WitnessRobot
 

@@ -17,6 +17,7 @@ import psutil
 
 from equipment.devtools import Chromium, Tab
 from equipment.processes import WEB, Process
+from equipment.waiting import wait_for
 from webmap.testing import FaultProxy, Sentinel, Shape, WitnessRobot
 
 SITE = Path(__file__).with_name("safety_site.py")
@@ -27,15 +28,6 @@ NEUTRAL = 0.3
 
 ROBOT_TIMEOUT = 0.5
 """Seconds without a command after which the witness robot stops by itself."""
-
-
-def wait_for(check, what, within=15.0):
-    deadline = time.monotonic() + within
-    while time.monotonic() < deadline:
-        if found := check():
-            return found
-        time.sleep(0.01)
-    raise AssertionError(f"{what} did not happen within {within} s")
 
 
 def pass_time(seconds):

@@ -18,9 +18,11 @@ import os
 import time
 from typing import NamedTuple
 
-from safety_bench import pass_time, wait_for
+from safety_bench import pass_time
 from safety_load import helper
 from safety_waiting import Contention
+
+from equipment.waiting import wait_for
 
 SETTLE = 2.0
 """Seconds for which the peers send before the good robot is driven."""

@@ -11,7 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from safety_bench import wait_for
+from equipment.waiting import wait_for
 
 VIEWERS = 50
 SILENT = 5

@@ -5,11 +5,12 @@ import time
 
 import psutil
 import pytest
-from safety_bench import V_MAX, W_MAX, Bench, pass_time, wait_for
+from safety_bench import V_MAX, W_MAX, Bench, pass_time
 from safety_figures import Figure, note
 from safety_run import FULL, TRIALS, Progress, grace, is_measured
 from safety_waiting import Waiting
 
+from equipment.waiting import wait_for
 from webmap.gate.rules.motion import LENGTH, NEW_LINK_LENGTH
 from webmap.testing import Bounds, Quiet, check_invariants
 

@@ -9,9 +9,10 @@ Each direction is sent for 0.4 s, and again 5.6 s later; all stalls are shorter.
 import time
 
 import pytest
-from safety_bench import pass_time, wait_for
+from safety_bench import pass_time
 from safety_run import LONG
 
+from equipment.waiting import wait_for
 from webmap.testing import Shape
 
 pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]

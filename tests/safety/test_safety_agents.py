@@ -8,10 +8,11 @@ import time
 
 import pytest
 from safety_agent_bench import ROBOT, AgentBench
-from safety_bench import pass_time, wait_for
+from safety_bench import pass_time
 from safety_figures import Figure, note
 from safety_run import TRIALS, Progress, is_measured
 
+from equipment.waiting import wait_for
 from webmap.agents import address
 from webmap.agents.peer import Peer
 from webmap.agents.router_access import RouterUser

@@ -7,10 +7,11 @@ import time
 from contextlib import ExitStack
 
 import pytest
-from safety_bench import pass_time, wait_for
+from safety_bench import pass_time
 from safety_load import helper
 from safety_run import grace
 
+from equipment.waiting import wait_for
 from webmap.gate.display.client import GateClient
 from webmap.gate.protocol import RobotSpec
 from webmap.testing import Sentinel, WitnessRobot

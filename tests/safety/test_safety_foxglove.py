@@ -13,9 +13,10 @@ from contextlib import ExitStack, suppress
 import psutil
 import pytest
 from safety_agent_bench import FarDriver
-from safety_bench import pass_time, wait_for
+from safety_bench import pass_time
 
 from equipment.foxglove_robots import OldRobot, OtherClient, SdkRobot
+from equipment.waiting import wait_for
 from webmap.gate.lanes.control import MOST
 from webmap.testing import FaultProxy, Sentinel
 

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
-from safety_bench import wait_for
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from equipment.chromium import watched_tab
 from equipment.processes import WEB, reset, running
+from equipment.waiting import wait_for
 from webmap.gate.display.client import GateClient
 from webmap.gate.protocol import RobotSpec, StopHook
 from webmap.testing import Sentinel, WitnessRobot

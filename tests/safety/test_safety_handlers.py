@@ -11,8 +11,10 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import pytest
-from safety_bench import NEUTRAL, pass_time, wait_for
+from safety_bench import NEUTRAL, pass_time
 from safety_run import grace
+
+from equipment.waiting import wait_for
 
 pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]
 

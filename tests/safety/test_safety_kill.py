@@ -13,10 +13,11 @@ from pathlib import Path
 
 import psutil
 import pytest
-from safety_bench import ROBOT_TIMEOUT, pass_time, wait_for
+from safety_bench import ROBOT_TIMEOUT, pass_time
 from safety_figures import Figure, note
 from safety_run import FULL, TRIALS, Progress, grace, is_measured
 
+from equipment.waiting import wait_for
 from webmap.testing import Bounds, Quiet, Sentinel, WitnessRobot, check_invariants
 
 pytestmark = [pytest.mark.safety, pytest.mark.serial]

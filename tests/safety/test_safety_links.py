@@ -3,9 +3,10 @@
 import time
 
 import pytest
-from safety_bench import ROBOT_TIMEOUT, SLOW, wait_for
+from safety_bench import ROBOT_TIMEOUT, SLOW
 from safety_run import LONG
 
+from equipment.waiting import wait_for
 from webmap.testing import Shape
 
 pytestmark = [

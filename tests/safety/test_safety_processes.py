@@ -3,8 +3,10 @@
 import signal
 
 import pytest
-from safety_bench import ROBOT_TIMEOUT, pass_time, wait_for
+from safety_bench import ROBOT_TIMEOUT, pass_time
 from safety_run import LONG
+
+from equipment.waiting import wait_for
 
 pytestmark = [
     pytest.mark.safety,

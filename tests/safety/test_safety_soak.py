@@ -9,11 +9,12 @@ import time
 
 import psutil
 import pytest
-from safety_bench import pass_time, wait_for
+from safety_bench import pass_time
 from safety_figures import Soak, note
 from safety_load import UNDER_LOAD, maps_coming, under_load
 from safety_run import FULL, SHOW
 
+from equipment.waiting import wait_for
 from webmap.gate.rules.motion import HELD_PERIOD
 
 pytestmark = [pytest.mark.safety, pytest.mark.browser, pytest.mark.serial]

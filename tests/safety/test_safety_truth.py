@@ -7,9 +7,10 @@ its commands. Its odometry goes back to the text on the page.
 import time
 
 import pytest
-from safety_bench import V_MAX, Bench, pass_time, wait_for
+from safety_bench import V_MAX, Bench, pass_time
 from safety_run import LONG
 
+from equipment.waiting import wait_for
 from webmap.gate.rules.motion import DEADMAN
 from webmap.testing import Shape
 

@@ -6,18 +6,10 @@ import time
 import pytest
 from websockets.sync.client import connect
 
+from equipment.waiting import wait_for
 from webmap.base.geometry import Twist
 from webmap.ros.rosbridge import ops
 from webmap.testing import Sentinel, WitnessRobot
-
-
-def eventually(check, what, seconds=10.0):
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        if found := check():
-            return found
-        time.sleep(0.005)
-    raise AssertionError(f"{what} did not happen")
 
 
 def twist(vx, wz=0.0):
@@ -43,7 +35,7 @@ def link(robot):
 def test_the_witness_robot_logs_velocities_with_their_arrival_time(robot, link):
     before = time.monotonic()
     link.send(twist(0.5, 0.25))
-    received = eventually(lambda: robot.log.twists, "a velocity")[0]
+    received = wait_for(lambda: robot.log.twists, "a velocity")[0]
     assert received.twist == Twist(0.5, 0.0, 0.25)
     assert before <= received.at <= time.monotonic()
     assert robot.log.of("publish", "/cmd_vel")[0].link == 1
@@ -52,9 +44,9 @@ def test_the_witness_robot_logs_velocities_with_their_arrival_time(robot, link):
 def test_the_witness_robot_stops_after_its_command_timeout(robot, link):
     link.send(twist(0.5))
     # The robot may have stopped again before this thread checks.
-    eventually(lambda: any(m.twist.vx == 0.5 for m in robot.log.moved[:]), "moving")
+    wait_for(lambda: any(m.twist.vx == 0.5 for m in robot.log.moved[:]), "moving")
     received_at = robot.log.twists[-1].at
-    rest = eventually(lambda: robot.log.standstill(received_at + 0.1), "a standstill")
+    rest = wait_for(lambda: robot.log.standstill(received_at + 0.1), "a standstill")
     assert rest - received_at >= 0.2
     assert robot.log.first_zero(0) is None
 
@@ -62,18 +54,18 @@ def test_the_witness_robot_stops_after_its_command_timeout(robot, link):
 def test_a_witness_robot_without_command_timeout_moves_until_a_zero_arrives():
     with WitnessRobot(timeout=None) as robot, connect(robot.url) as link:
         link.send(twist(0.5))
-        eventually(lambda: robot.velocity.vx == 0.5, "moving")
+        wait_for(lambda: robot.velocity.vx == 0.5, "moving")
         received_at = robot.log.twists[-1].at
-        eventually(lambda: robot.log.moved[-1].at > received_at + 0.7, "a while")
+        wait_for(lambda: robot.log.moved[-1].at > received_at + 0.7, "a while")
         assert robot.velocity.vx == 0.5
         link.send(twist(0.0))
-        eventually(lambda: robot.velocity.vx == 0.0, "a stop")
+        wait_for(lambda: robot.velocity.vx == 0.0, "a stop")
 
 
 def test_a_disobeying_witness_robot_logs_velocities_but_does_not_move(robot, link):
     robot.obeys = False
     link.send(twist(0.5))
-    eventually(lambda: robot.log.twists, "a velocity")
+    wait_for(lambda: robot.log.twists, "a velocity")
     assert robot.velocity.is_zero
 
 
@@ -109,26 +101,26 @@ def test_a_hanging_service_call_blocks_later_messages_of_the_same_socket(robot, 
     robot.answers_services(False)
     link.send(call("/e_stop"))
     link.send(twist(0.5))
-    eventually(lambda: robot.log.of("call_service"), "the call")
+    wait_for(lambda: robot.log.of("call_service"), "the call")
     assert link.ping().wait(5), "pings are not answered while the call hangs"
     assert robot.log.twists == []
     with connect(robot.url) as other:
         other.send(twist(0.25))
-        eventually(lambda: robot.log.twists, "another socket's velocity")
+        wait_for(lambda: robot.log.twists, "another socket's velocity")
     robot.unblock()
     assert json.loads(link.recv(timeout=5))["result"] is True
-    eventually(lambda: len(robot.log.twists) == 2, "the delayed velocity")
+    wait_for(lambda: len(robot.log.twists) == 2, "the delayed velocity")
 
 
 def test_a_blocking_goal_delays_later_messages_until_the_goal_ends():
     with WitnessRobot(goals_block=True) as robot, connect(robot.url) as link:
         link.send(json.dumps({"op": "send_action_goal", "action": "/go", "id": "g"}))
         link.send(twist(0.5))
-        eventually(lambda: robot.log.of("send_action_goal"), "the goal")
+        wait_for(lambda: robot.log.of("send_action_goal"), "the goal")
         assert link.ping().wait(5), "pings are not answered while the goal runs"
         assert robot.log.twists == []
         robot.unblock()
-        eventually(lambda: robot.log.twists, "the delayed velocity")
+        wait_for(lambda: robot.log.twists, "the delayed velocity")
 
 
 def test_rosapi_lists_the_topics_of_the_witness_robot(robot, link):
@@ -149,21 +141,21 @@ def test_a_killed_witness_bridge_restarts_on_the_same_port(robot, link):
     assert robot.port == port
     with connect(robot.url) as again:
         again.send(twist(0.5))
-        eventually(lambda: robot.log.twists, "a velocity")
+        wait_for(lambda: robot.log.twists, "a velocity")
 
 
 def test_the_witness_robot_receives_a_velocity_after_invalid_messages(robot, link):
     for junk in ("{", "[]", "7", '{"op": "publish", "topic": "/cmd_vel", "msg": 7}'):
         link.send(junk)
     link.send(twist(0.5))
-    received = eventually(lambda: robot.log.moving_since(0)[1:], "the valid velocity")
+    received = wait_for(lambda: robot.log.moving_since(0)[1:], "the valid velocity")
     assert received[-1].twist.vx == 0.5
 
 
 def test_the_sentinel_measures_the_delays_of_the_computer():
     with Sentinel() as sentinel:
         begin = time.monotonic()
-        eventually(lambda: time.monotonic() > begin + 0.1, "a while")
+        wait_for(lambda: time.monotonic() > begin + 0.1, "a while")
         assert 0 < sentinel.worst(begin) < 5
         assert sentinel.worst(begin + 60) == 0
         assert 0 <= sentinel.stolen(begin) <= time.monotonic() - begin + 0.1

@@ -4,7 +4,6 @@ import asyncio
 import gc
 import json
 import threading
-import time
 from pathlib import Path
 
 from webmap.core.base_page import PageEntry
@@ -102,13 +101,6 @@ def open_page(model, page_id="page0001", viewer=ANN):
         model.runtime.call(done.set)
         assert done.wait(30)
     return opened
-
-
-def wait_for(condition):
-    deadline = time.monotonic() + 20
-    while not condition():
-        assert time.monotonic() < deadline, "the condition was not met in time"
-        time.sleep(0.01)
 
 
 def objects_left(round_of, rounds: int, pages: int) -> list[int]:

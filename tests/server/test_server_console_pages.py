@@ -3,8 +3,9 @@
 import asyncio
 
 import pytest
-from page_loop import make_model, objects_left, open_page, wait_for
+from page_loop import make_model, objects_left, open_page
 
+from equipment.waiting import wait_for
 from webmap import Bridge, Robot, RobotConfig
 from webmap.console import make_robot
 from webmap.console.console import Console

@@ -8,7 +8,8 @@ from types import SimpleNamespace
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
-from equipment.server_fakes import TOKEN, wait_for
+from equipment.server_fakes import TOKEN
+from equipment.waiting import wait_for
 from webmap import Bridge, Robot
 from webmap.base.counts import counts
 from webmap.base.errors import ConfigError

@@ -7,9 +7,10 @@ import weakref
 from types import SimpleNamespace
 
 import pytest
-from page_loop import begin_page, make_model, open_page, wait_for
+from page_loop import begin_page, make_model, open_page
 
 import webmap
+from equipment.waiting import wait_for
 from webmap.base.errors import ConfigError
 from webmap.core.operators import Viewer
 from webmap.server import open_pages as host_module

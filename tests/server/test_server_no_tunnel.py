@@ -10,7 +10,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from equipment.processes import WEB, running
-from equipment.server_fakes import sign_in, wait_for
+from equipment.server_fakes import sign_in
+from equipment.waiting import wait_for
 from webmap.testing.witness import WitnessRobot
 
 pytestmark = pytest.mark.slow

@@ -8,9 +8,10 @@ import time
 from dataclasses import replace
 
 import pytest
-from page_loop import ANN, HELLO, make_model, objects_left, open_page, wait_for
+from page_loop import ANN, HELLO, make_model, objects_left, open_page
 
 import webmap
+from equipment.waiting import wait_for
 from webmap.base.errors import MotionError
 from webmap.base.scope import Removal, keep
 from webmap.core.frame_pace import FramePace

@@ -18,8 +18,8 @@ from equipment.server_fakes import (
     FakeSite,
     key_in,
     running,
-    wait_for,
 )
+from equipment.waiting import wait_for
 from webmap.base.errors import ConfigError
 from webmap.core import operators
 from webmap.server import people as module

@@ -17,8 +17,8 @@ from equipment.server_fakes import (
     FakeSite,
     key_in,
     running,
-    wait_for,
 )
+from equipment.waiting import wait_for
 from webmap.base.errors import ConfigError
 from webmap.server.access import Settings
 from webmap.server.app import WebApp

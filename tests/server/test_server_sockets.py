@@ -13,7 +13,8 @@ from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.frames import Frame, Opcode
 
-from equipment.server_fakes import TOKEN, running, wait_for
+from equipment.server_fakes import TOKEN, running
+from equipment.waiting import wait_for
 from webmap.server.access import Settings
 from webmap.server.app import WebApp
 from webmap.server.page_socket import OPENS_AT_ONCE, REPLACED, TOO_SOON

@@ -16,8 +16,8 @@ from equipment.server_fakes import (
     FakePage,
     FakeSite,
     running,
-    wait_for,
 )
+from equipment.waiting import wait_for
 from webmap.server import page_socket, runner
 from webmap.server.access import Settings
 from webmap.server.app import WebApp

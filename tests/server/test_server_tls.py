@@ -17,6 +17,7 @@ from equipment.server_fakes import (
     FakeSite,
     running,
 )
+from equipment.waiting import wait_for
 from webmap.base.tls import Renewal, tls_files
 from webmap.server import runner
 from webmap.server.access import PROTOCOL, Settings
@@ -108,10 +109,9 @@ def test_the_renewal_is_looked_for_while_the_server_runs(tls, tmp_path, monkeypa
     with running(app, tls):
         before = tls.files.certificate.read_bytes()
         tls.files.certificate.unlink()
-        end = time.monotonic() + 20
-        while time.monotonic() < end:
+
+        def is_new():
             with contextlib.suppress(OSError):
-                if tls.files.certificate.read_bytes() != before:
-                    break
-        else:
-            raise AssertionError("no new certificate within 20 s")
+                return tls.files.certificate.read_bytes() != before
+
+        wait_for(is_new, "a new certificate")

@@ -3,9 +3,10 @@
 import time
 
 import pytest
-from page_loop import make_model, open_page, wait_for
+from page_loop import make_model, open_page
 
 import webmap
+from equipment.waiting import wait_for
 from equipment.webmap_process import simulator
 from webmap.base import audience as audience_module
 from webmap.base.audience import audience

@@ -17,8 +17,8 @@ from equipment.server_fakes import (
     FakePage,
     FakeSite,
     running,
-    wait_for,
 )
+from equipment.waiting import wait_for
 from webmap.core import pictures
 from webmap.core.pictures import VideoStream, Viewing, videos
 from webmap.server.access import Settings

@@ -18,6 +18,7 @@ from websockets.asyncio.client import connect
 
 from equipment.captured_frames import PLAYER, frame_file, played
 from equipment.frame_player import load_recording
+from equipment.waiting import until
 from webmap.base.errors import ConfigError
 from webmap.ros.rosbridge.server.dialect import (
     POLITE,
@@ -206,9 +207,7 @@ def test_disconnected_clients_leave_no_sessions_and_no_subscriptions():
                     await client.send(json.dumps(call))
                     await client.recv()
                 assert len(graph.topics["/chatter"].subscribers) == 10
-        async with asyncio.timeout(10):
-            while server.sessions:
-                await asyncio.sleep(0)
+        await until(lambda: not server.sessions)
         assert graph.topics["/chatter"].subscribers == {}
         await server.stop()
 

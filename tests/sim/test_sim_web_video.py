@@ -8,13 +8,13 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 
 import pytest
 from PIL import Image
 from simulated import Bench
 from websockets.sync.client import connect
 
+from equipment.waiting import until
 from webmap import Robot
 from webmap.base.errors import ConfigError
 from webmap.base.lifecycle import Lifecycle
@@ -192,13 +192,6 @@ def serving(scenario):
         assert not served.server._clients
 
     asyncio.run(whole())
-
-
-async def until(condition, seconds=10.0):
-    patience = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < patience, "the condition was not met in time"
-        await asyncio.sleep(0.005)
 
 
 def test_the_display_parser_reads_a_stream_and_the_server_notices_the_end():

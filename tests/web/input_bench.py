@@ -8,6 +8,7 @@ from fake_drive import FakeDrive
 from playwright.sync_api import Browser, Page
 
 from equipment.chromium import Complaints
+from equipment.waiting import wait_for
 
 INPUT_BLOCKERS = {
     "blur": "window.dispatchEvent(new Event('blur'))",
@@ -52,13 +53,8 @@ class Bench:
         return self.page.evaluate("bench.drive.state")
 
     def until(self, true: Callable[[], object], patience: float = 10.0) -> None:
-        deadline = time.monotonic() + patience
-        while not true():
-            assert time.monotonic() < deadline, (
-                f"timed out; last messages: {self.gate.received[-3:]}"
-            )
-            # The wait lets the browser handle the events of the page.
-            self.page.wait_for_timeout(10)
+        last = lambda: f"the condition; last messages: {self.gate.received[-3:]}"  # noqa: E731
+        wait_for(true, last, patience, self.page)
 
     def select(self, robot: str | None, map: int = 0) -> None:
         self.page.evaluate("([m, r]) => bench.maps[m].select(r)", [map, robot])

@@ -7,6 +7,7 @@ import pytest
 from equipment.chromium import asleep
 from equipment.devtools import Chromium
 from equipment.scene_host import wait
+from equipment.waiting import wait_for
 from webmap.scene.wire.session import SceneSession
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
@@ -69,7 +70,7 @@ def test_a_page_that_the_browser_froze_connects_again(host, opened):
             time.sleep(0.01)
         assert mine.frames - before <= SceneSession.WINDOW
         tab.call("Page.setWebLifecycleState", state="active")
-        host.until(lambda: len(mine.hellos) == 2)
+        wait_for(lambda: len(mine.hellos) == 2)
         browser.activate(tab)
         tab.wait("window.drawn.includes(2)")
         assert tab.evaluate("drawn.find((x) => x !== null)") == 2, (

@@ -5,6 +5,7 @@ import struct
 import pytest
 
 from equipment.scene_host import wait
+from equipment.waiting import wait_for
 from webmap.scene import svg
 from webmap.scene.node import Fragment
 from webmap.scene.wire.messages import ElementEvent
@@ -93,7 +94,7 @@ def moved(host, tab, fleet, times=5):
     for number in range(times):
         frames = host.one.frames
         host.call(fleet.place, 0.1 * (number + 1))
-        host.until(lambda before=frames: host.one.frames > before, tab=tab)
+        wait_for(lambda before=frames: host.one.frames > before, page=tab)
         tab.evaluate(
             "new Promise((done) => requestAnimationFrame(() => setTimeout(done)))"
         )
@@ -185,7 +186,7 @@ def test_a_small_robot_is_hovered_and_clicked_like_any_other(host, tab):
     over = f"document.elementFromPoint({x}, {y}).parentNode.dataset.robot"
     assert tab.evaluate(over) == "r0"
     tab.mouse.click(x, y)
-    (event,) = host.until(lambda: host.events(ElementEvent), tab=tab)
+    (event,) = wait_for(lambda: host.events(ElementEvent), page=tab)
     assert event.element == robots[0].id
     tab.mouse.move(x - 100, y + 100)
     wait(tab, f"{FAR} === {MANY}")
@@ -200,10 +201,10 @@ def test_a_small_robot_is_hovered_and_clicked_like_any_other(host, tab):
         }""",
         [x + 12, y + 4],
     )
-    host.until(lambda: len(host.events(ElementEvent)) == 2, tab=tab)
+    wait_for(lambda: len(host.events(ElementEvent)) == 2, page=tab)
     assert host.events(ElementEvent)[1].element == robots[1].id
     tab.mouse.click(x - 100, y + 100)
-    host.until(lambda: len(host.events(ElementEvent)) == 3, tab=tab)
+    wait_for(lambda: len(host.events(ElementEvent)) == 3, page=tab)
     assert host.events(ElementEvent)[2].element == host.one.fleet.root.id
 
 

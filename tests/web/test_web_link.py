@@ -3,6 +3,7 @@
 import pytest
 
 from equipment.scene_host import wait
+from equipment.waiting import wait_for
 from webmap.scene.wire.messages import Trouble, ViewReport
 from webmap.scene.wire.opcodes import VERSION
 from webmap.scene.wire.session import SceneSession
@@ -61,7 +62,7 @@ def test_a_page_sends_its_url_its_size_and_its_theme_in_its_hello(host, tab, ope
 
 def test_a_page_under_a_prefix_sends_its_url_without_the_prefix(host, tab):
     tab.goto(f"{host.url}under/prefix/")
-    host.until(lambda: host.shown and host.one.hellos, tab=tab)
+    wait_for(lambda: host.shown and host.one.hellos, page=tab)
     assert host.one.hellos[0].url == "/"
 
 
@@ -86,7 +87,7 @@ def test_the_address_of_the_socket_is_not_too_long_with_the_sizes_of_many_elemen
     tab.on("websocket", lambda socket: addresses.append(socket.url))
     tab.add_init_script(ADD_MANY)
     tab.goto(f"{host.url}?x={'%22' * 1000}")
-    host.until(lambda: host.shown and host.one.hellos and addresses, tab=tab)
+    wait_for(lambda: host.shown and host.one.hellos and addresses, page=tab)
     sizes = host.one.hellos[0].containers
     assert 2 < len(sizes) < MANY
     assert sizes["map"] == (700, 500)
@@ -175,12 +176,12 @@ def test_a_page_that_was_hidden_soon_replaces_a_connection_that_was_lost(
     hide = "Object.defineProperty(document, 'hidden', {value: %s, configurable: true})"
     tab.evaluate(hide % "true")
     before = opened.frames
-    host.until(lambda: opened.frames > before + 1, tab=tab)
+    wait_for(lambda: opened.frames > before + 1, page=tab)
     host.silent = True
     tab.wait_for_timeout(500)
     tab.evaluate(hide % "false")
     # Sooner than a page that is visible all the time, which waits for 10 s.
-    host.until(lambda: len(opened.hellos) == 2, 7.0, tab=tab)
+    wait_for(lambda: len(opened.hellos) == 2, page=tab)
     host.silent = False
 
 
@@ -188,20 +189,20 @@ def test_the_view_is_kept_after_a_lost_link(host, tab, opened):
     drag(tab, 33)
     before = view(tab)
     host.drop()
-    host.until(lambda: len(opened.hellos) == 2, tab=tab)
+    wait_for(lambda: len(opened.hellos) == 2, page=tab)
     tab.wait_for_selector(".robot circle")
     wait(tab, "!document.documentElement.classList.contains('disconnected')")
     assert view(tab) == before
     # An operation of the program is applied once, even if it is sent repeatedly.
     host.call(opened.session.view, opened.root.id, "translate", 0, 5)
-    host.until(lambda: newest(host, "applied") == 2, tab=tab)
+    wait_for(lambda: newest(host, "applied") == 2, page=tab)
     assert view(tab)[5] == pytest.approx(before[5] + 5)
 
 
 def test_the_view_and_the_map_are_kept_after_a_reload(host, tab, opened):
     drag(tab, 33)
     before = view(tab)
-    host.until(lambda: newest(host, "e") == before[4], tab=tab)
+    wait_for(lambda: newest(host, "e") == before[4], page=tab)
     host.call(opened.session.set_class, opened.inner, "selected", True)
     tab.reload()
     tab.wait_for_selector(".robot.selected circle")
@@ -249,8 +250,8 @@ def test_an_unknown_record_is_reported_and_the_scene_is_sent_again(host, tab, op
     frames = opened.frames
     host.send(frame_of(b"\xfa"))
     tab.wait_for_selector("[role=alert]:has-text('cannot read a message')")
-    host.until(lambda: "250" in str(host.events(Trouble)), tab=tab)
-    host.until(lambda: opened.frames > frames, tab=tab)
+    wait_for(lambda: "250" in str(host.events(Trouble)), page=tab)
+    wait_for(lambda: opened.frames > frames, page=tab)
     host.call(opened.robot.set_pose, 1, 2, 0)
     wait(tab, "document.querySelector('.robot').transform.baseVal.length")
 

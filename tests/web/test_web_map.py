@@ -5,6 +5,7 @@ import math
 import pytest
 
 from equipment.scene_host import wait
+from equipment.waiting import wait_for
 from webmap.scene.wire.messages import ModuleMessage, ModuleReady, Trouble, ViewReport
 
 pytestmark = pytest.mark.browser
@@ -54,7 +55,7 @@ def last_report(host, tab, true=lambda report: True):
         reports = host.events(ViewReport)
         return reports and true(reports[-1]) and reports[-1]
 
-    return host.until(found, tab=tab)
+    return wait_for(found, page=tab)
 
 
 def test_a_new_map_has_the_world_origin_in_its_centre(host, tab, open_map):
@@ -145,7 +146,7 @@ def test_a_fit_of_a_hidden_map_is_applied_when_the_map_is_shown(host, tab, open_
 
     host.build = build_map
     tab.goto(host.url)
-    host.until(lambda: host.shown and host.one.frames, tab=tab)
+    wait_for(lambda: host.shown and host.one.frames, page=tab)
     host.call(lambda: host.one.document.bind("map").unset("hidden"))
     last_report(host, tab, lambda report: report.width == 700)
     middle = on_map(tab, "return map.toWorld(350, 250)")
@@ -213,9 +214,7 @@ def test_suppress_next_click_discards_one_click(host, tab, open_map):
     tab.mouse.click(100, 100)
     tab.evaluate("window.once.abort()")
     tab.mouse.click(200, 200)
-    clicks = host.until(
-        lambda: [e for e in shown.events if hasattr(e, "event")], tab=tab
-    )
+    clicks = wait_for(lambda: [e for e in shown.events if hasattr(e, "event")], tab=tab)
     assert [click.x for click in clicks] == [190]
 
 
@@ -224,18 +223,14 @@ def test_a_module_receives_the_selected_robot(host, tab, open_map):
         shown.session.attach(shown.root.id, 5, "test.js", {"speed": 2}, "half.css")
 
     shown = open_map(build=build)
-    (ready,) = host.until(lambda: host.events(ModuleReady), tab=tab)
+    (ready,) = wait_for(lambda: host.events(ModuleReady), page=tab)
     assert ready.instance == 5
     (first,) = host.events(ModuleMessage)
     assert first.data == {"options": {"speed": 2}, "selected": None, "width": 700}
     host.call(shown.session.set_class, shown.inner, "selected", True)
-    host.until(
-        lambda: host.events(ModuleMessage)[-1].data == {"selected": "r1"}, tab=tab
-    )
+    wait_for(lambda: host.events(ModuleMessage)[-1].data == {"selected": "r1"}, tab=tab)
     host.call(shown.session.unmount, shown.inner)
-    host.until(
-        lambda: host.events(ModuleMessage)[-1].data == {"selected": None}, tab=tab
-    )
+    wait_for(lambda: host.events(ModuleMessage)[-1].data == {"selected": None}, tab=tab)
     color = "getComputedStyle(document.querySelector('.overlay > .half')).fill"
     wait(tab, f"{color} === 'rgb(255, 0, 0)'")
     assert on_map(tab, "return typeof map.drive.on") == "function"
@@ -256,7 +251,7 @@ def test_a_module_receives_messages_sent_before_its_script_was_loaded(
         data = [message.data for message in host.events(ModuleMessage)]
         return [one["echo"]["n"] for one in data if "echo" in one]
 
-    host.until(lambda: echoes() == [1, 2, 3], tab=tab)
+    wait_for(lambda: echoes() == [1, 2, 3], page=tab)
     host.call(shown.session.send, 5, {"fail": True})
     tab.wait_for_selector("[role=alert]:has-text('as asked')")
     tab.click("[role=alert] button[aria-label=Dismiss]")
@@ -282,7 +277,7 @@ def test_a_module_is_detached_when_its_map_is_removed(host, tab, open_map):
     attached = (
         "import('/_webmap/web/page.js').then(({ page }) => page.parts._attached.size)"
     )
-    host.until(lambda: tab.evaluate(attached) == 0, tab=tab)
+    wait_for(lambda: tab.evaluate(attached) == 0, page=tab)
 
 
 @pytest.mark.parametrize(
@@ -299,7 +294,7 @@ def test_a_module_that_cannot_be_loaded_is_shown_and_reported(
     tab.allowed = ["404"]
     open_map(build=lambda shown: shown.session.attach(shown.root.id, 5, module, {}))
     tab.wait_for_selector(f"[role=alert]:has-text('{message}')")
-    host.until(lambda: message in str(host.events(Trouble)), tab=tab)
+    wait_for(lambda: message in str(host.events(Trouble)), page=tab)
     assert tab.locator(".robot").count() == 1
 
 

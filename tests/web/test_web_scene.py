@@ -6,6 +6,7 @@ import struct
 import pytest
 
 from equipment.scene_host import wait
+from equipment.waiting import wait_for
 from webmap.base.geometry import Affine
 from webmap.scene import html, svg
 from webmap.scene.node import Fragment
@@ -104,7 +105,7 @@ def test_an_id_missing_in_the_page_is_shown_and_reported(host, tab):
     tab.goto(host.url)
     tab.wait_for_selector("#label:text('found')")
     assert "nowhere" in tab.inner_text("[role=alert]")
-    (trouble,) = host.until(lambda: host.events(Trouble), tab=tab)
+    (trouble,) = wait_for(lambda: host.events(Trouble), page=tab)
     assert "nowhere" in trouble.text
 
 
@@ -124,7 +125,7 @@ def test_image_urls_get_the_prefix_and_urls_of_other_servers_are_refused(host, t
     prefix = f"{host.url}under/prefix/_webmap/"
     assert tab.get_attribute("image[href]", "href") == f"{prefix}images/x.png"
     assert tab.locator("image:not([href])").count() == 1
-    host.until(lambda: "evil" in str(host.events(Trouble)), tab=tab)
+    wait_for(lambda: "evil" in str(host.events(Trouble)), page=tab)
 
 
 def test_a_fast_changing_image_skips_to_the_newest_url_after_each_load(host, tab):
@@ -144,7 +145,7 @@ def test_a_fast_changing_image_skips_to_the_newest_url_after_each_load(host, tab
     asked = []
     tab.route("**/_webmap/images/*", lambda route: asked.append(route))
     tab.goto(host.url)
-    host.until(lambda: len(asked) == 1, tab=tab)
+    wait_for(lambda: len(asked) == 1, page=tab)
     for number in 2, 3, 4:
         host.call(host.one.image.set, href=f"/_webmap/images/{number}.png")
         host.call(host.one.root.set, data_at=str(number))
@@ -152,11 +153,11 @@ def test_a_fast_changing_image_skips_to_the_newest_url_after_each_load(host, tab
     shows(1)
     asked[0].fulfill(body=PIXEL, content_type="image/png")
     shows(4)
-    host.until(lambda: len(asked) == 2, tab=tab)
+    wait_for(lambda: len(asked) == 2, page=tab)
     asked[1].fulfill(body="no image", content_type="image/png")
     host.call(host.one.image.set, href="/_webmap/images/5.png")
     shows(5)  # a file that is not an image blocks nothing
-    host.until(lambda: len(asked) == 3, tab=tab)
+    wait_for(lambda: len(asked) == 3, page=tab)
     host.call(host.one.image.unset, "href")
     tab.wait_for_selector("image:not([href])", state="attached")
     asked[2].fulfill(body=PIXEL, content_type="image/png")
@@ -373,12 +374,12 @@ def test_a_click_event_contains_its_world_coordinates(host, tab):
     tab.goto(host.url)
     tab.wait_for_selector(".robot circle")
     tab.mouse.click(10 + 350 + 20, 5 + 250 - 10)
-    (event,) = host.until(lambda: host.events(ElementEvent), tab=tab)
+    (event,) = wait_for(lambda: host.events(ElementEvent), page=tab)
     assert event.element == host.one.robot.id
     assert (event.x, event.y) == pytest.approx((370, 240))
     assert (event.world_x, event.world_y) == pytest.approx((2, 1))
     tab.mouse.click(10 + 350 + 200, 5 + 250 - 100, button="left")
-    host.until(lambda: len(host.events(ElementEvent)) == 2, tab=tab)
+    wait_for(lambda: len(host.events(ElementEvent)) == 2, page=tab)
     missed = host.events(ElementEvent)[1]
     assert missed.element == host.one.root.id
     assert (missed.world_x, missed.world_y) == pytest.approx((20, 10))
@@ -394,7 +395,7 @@ def test_click_coordinates_on_a_framed_map_start_inside_the_frame(host, tab):
     tab.goto(host.url)
     tab.wait_for_selector(".framed")
     tab.mouse.click(10 + 5 + 100, 5 + 5 + 50)
-    (event,) = host.until(lambda: host.events(ElementEvent), tab=tab)
+    (event,) = wait_for(lambda: host.events(ElementEvent), page=tab)
     assert (event.x, event.y) == pytest.approx((100, 50))
     assert (event.world_x, event.world_y) == pytest.approx((-100, 100))
 
@@ -416,7 +417,7 @@ def test_input_and_key_events_contain_the_value_the_checked_state_and_the_key(
     tab.focus("#field")
     tab.keyboard.press("Shift+X")
     tab.fill("#field", "typed")
-    host.until(lambda: len(host.events(ElementEvent)) == 4, tab=tab)
+    wait_for(lambda: len(host.events(ElementEvent)) == 4, page=tab)
     change, shift, key, typed = host.events(ElementEvent)
     assert (change.event, change.checked) == ("change", True)
     assert (shift.key, key.key, key.shift) == ("Shift", "X", True)
@@ -441,7 +442,7 @@ def test_the_page_sends_no_event_after_the_listener_was_removed(host, tab):
     host.build = build
     tab.goto(host.url)
     tab.click("#go")
-    host.until(lambda: host.events(ElementEvent), tab=tab)
+    wait_for(lambda: host.events(ElementEvent), page=tab)
     # The title in the same frame shows that the page has received the removal.
     host.call(lambda: (host.one.removal.remove(), host.one.button.set(title="deaf")))
     tab.wait_for_selector("#go[title=deaf]")

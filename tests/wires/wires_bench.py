@@ -3,7 +3,6 @@
 import asyncio
 import contextlib
 import sys
-import time
 from pathlib import Path
 
 import psutil
@@ -14,6 +13,7 @@ from wires_robot import Robot
 from wires_tap import FROM_GATE, Tap, lanes_of, settled
 
 import webmap
+from equipment.waiting import wait_for
 from webmap.core.runtime import runtime
 
 sys.path.append(str(Path(__file__).parents[1]))
@@ -133,15 +133,8 @@ class Bench:
 
     def until(self, check, what, seconds=PATIENCE):
         """Wait until ``check`` returns a true value, and return the value."""
-        deadline = time.monotonic() + seconds
-        while not (found := check()):
-            if time.monotonic() > deadline:
-                refused = [page.refusals for page in self._pages]
-                raise AssertionError(
-                    f"timed out waiting for {what}; refused: {refused}"
-                )
-            time.sleep(0.01)
-        return found
+        refused = lambda: [page.refusals for page in self._pages]  # noqa: E731
+        return wait_for(check, lambda: f"{what}; refused: {refused()}", seconds)
 
     def kill_the_gate(self):
         """Kill the gate's process."""

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from equipment.waiting import until
 from webmap.features.alerts.alerts import KINDS, LOST, Alerts, AlertWatch, conditions
 
 
@@ -174,9 +175,7 @@ def test_the_watch_looks_without_a_page_and_survives_a_faulty_robot(caplog):
     async def scenario():
         watch = AlertWatch(Alerts(), robots)
         watch.start(asyncio.get_running_loop())
-        async with asyncio.timeout(10):
-            while len(looks) < 2:
-                await asyncio.sleep(0.01)
+        await until(lambda: len(looks) >= 2)
         await watch.stop()
         await watch.stop()
 

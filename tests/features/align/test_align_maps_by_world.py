@@ -8,7 +8,6 @@ import asyncio
 import io
 import json
 import math
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -22,6 +21,7 @@ from PIL import Image
 from playwright.sync_api import Browser, Page
 
 from equipment.chromium import watched_tab
+from equipment.waiting import until
 from equipment.webmap_process import page_of
 from webmap.base.geometry import Affine
 
@@ -128,12 +128,7 @@ def value_of(colour: tuple[int, int, int, int]) -> int:
 
 
 async def shown(module):
-    deadline = time.monotonic() + 20
-    while not images(module.layer):
-        assert not module.layer.problems
-        assert time.monotonic() < deadline
-        await asyncio.sleep(0.002)
-    (only,) = images(module.layer)
+    (only,) = await until(lambda: images(module.layer), lambda: module.layer.problems)
     return only
 
 

@@ -14,6 +14,7 @@ from playwright.sync_api import expect
 from websockets.sync.client import connect
 
 from equipment.chromium import watched_tab
+from equipment.waiting import wait_for
 from equipment.webmap_process import page_of, simulator
 
 pytestmark = pytest.mark.browser
@@ -163,7 +164,7 @@ def test_an_alignment_made_by_hand_is_saved_and_applies_to_goals(chromium, tmp_p
             place = tab.evaluate(SCREEN, [x + 1.0, y + 2.0])
             send(tab, place, (place[0] + 60, place[1]))
             expect(tab.locator(".webmap-goal-arrow.sent")).to_be_attached()
-            until(tab, lambda: goals)
+            wait_for(lambda: goals, page=tab)
             rx, ry, _ = before["robot_0"]
             at, way = goals[0]["position"], goals[0]["orientation"]
             assert (at["x"], at["y"]) == pytest.approx((rx + 2.0, ry - 1.0), abs=0.05)
@@ -187,9 +188,9 @@ def test_an_alignment_made_by_hand_is_saved_and_applies_to_goals(chromium, tmp_p
             assert tab.locator(".webmap-align-shadow use").count() == 1
             tab.locator(".webmap-align [name=angle]").fill("0")
             save(tab)
-            until(
-                tab,
+            wait_for(
                 lambda: abs(tab.evaluate(ROBOT, "robot_1")[0] - 10.0 - rx) < 0.01,
+                page=tab,
             )
             now = tab.evaluate(ROBOT, "robot_0")[:2]
             assert now != pytest.approx(tab.evaluate(ROBOT, "robot_1")[:2])
@@ -208,11 +209,3 @@ def send(tab, place, end) -> None:
         )
         if not TOO_LATE.search(status.inner_text()):
             return
-
-
-def until(tab, condition) -> None:
-    for _ in range(400):
-        if condition():
-            return
-        tab.evaluate("() => new Promise((done) => setTimeout(done, 50))")
-    raise AssertionError("the condition was not met in time")

@@ -4,13 +4,13 @@ import asyncio
 import contextlib
 import json
 import threading
-import time
 from collections.abc import Iterator
 from types import SimpleNamespace
 
 import pytest
 from button_robot import robot_node
 
+from equipment.waiting import until
 from equipment.webmap_process import simulator
 from webmap import Bridge, Robot
 from webmap.base.errors import ConfigError
@@ -228,13 +228,6 @@ async def linked(url, services=None, topics=None):
     finally:
         await bridge.stop()
         await asyncio.to_thread(node.__exit__, None, None, None)
-
-
-async def until(condition) -> None:
-    deadline = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < deadline
-        await asyncio.sleep(0.01)
 
 
 def trigger(success=True, message="docked"):

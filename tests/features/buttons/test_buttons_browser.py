@@ -2,7 +2,6 @@
 
 import re
 import threading
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -11,6 +10,7 @@ from button_robot import RobotNode, robot_node
 from playwright.sync_api import Browser, Page, expect
 
 from equipment.chromium import watched_tab
+from equipment.waiting import wait_for
 from equipment.webmap_process import page_of, simulator
 
 pytestmark = pytest.mark.browser
@@ -136,10 +136,7 @@ def test_a_form_marks_an_invalid_field_and_publishes_valid_values(tab, bench):
     light.locator("[data-field=r]").fill("0.25")
     light.locator(".yes").click()
     expect(light.locator(".result")).to_have_text("Published")
-    deadline = time.monotonic() + 15
-    while not bench.node.received and time.monotonic() < deadline:
-        tab.wait_for_timeout(20)
-    assert bench.node.received == [
+    assert wait_for(lambda: bench.node.received, "the message", page=tab) == [
         ("/light", {"r": 0.25, "g": 0.5, "b": 0.0, "a": 1.0})
     ]
     expect(light.locator(".sheet")).to_be_hidden()

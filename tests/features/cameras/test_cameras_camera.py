@@ -10,6 +10,7 @@ import pytest
 from module_fakes import header
 from PIL import Image
 
+from equipment.waiting import until
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.core.pictures import pictures
 from webmap.features.cameras.camera import Camera, JpegAnyImageMsg, JpegImageMsg
@@ -260,10 +261,7 @@ def test_the_newest_raw_picture_is_shown(link, robot, topic):
                 "data": data,
             }
             link.publish(topic, message)
-        patience = time.monotonic() + 10
-        while camera.url is None or shown(camera).getpixel((4, 4))[0] < 190:
-            assert time.monotonic() < patience
-            await asyncio.sleep(0.01)
+        await until(lambda: camera.url and shown(camera).getpixel((4, 4))[0] >= 190)
 
     asyncio.run(scenario())
 

@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from equipment.camera_server import BOUNDARY, CameraServer, part
+from equipment.waiting import until
 from webmap import Robot
 from webmap.base.errors import ConfigError
 from webmap.base.lifecycle import Lifecycle
@@ -22,13 +23,6 @@ from webmap.ros.backoff import Backoff
 from webmap.ros.image_address import parse_address
 
 STREAM = "/stream?topic=/camera/image_raw&type=mjpeg"
-
-
-async def until(condition, seconds=10.0) -> None:
-    patience = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < patience, "the condition was not met in time"
-        await asyncio.sleep(0.005)
 
 
 def run(scenario) -> None:

@@ -4,12 +4,12 @@ Each robot is found, driven, stopped and sent to goals, one of which it rejects.
 """
 
 import asyncio
-import threading
 import time
 
 import pytest
 from running_simulators import simulators
 
+from equipment.waiting import until, wait_for
 from webmap.base.geometry import Twist
 from webmap.discovery import discover
 from webmap.gate.display.client import GateClient
@@ -42,7 +42,6 @@ class Site:
         self.version, self.simulator = version, simulator
         self.robot = simulator.world.robots[1]
         self.client = GateClient()
-        self._changed = threading.Condition()
         self.reports = {}
         self.client.on_report(self._hear)
         action, type = ACTIONS[dialect_of(version)]
@@ -62,17 +61,14 @@ class Site:
 
     def _hear(self, report):
         if isinstance(report, RobotReport):
-            with self._changed:
-                self.reports[report.robot] = report
-                self._changed.notify_all()
+            self.reports[report.robot] = report
 
-    def wait(self, test, id="bob", patience=20.0):
-        with self._changed:
-            done = self._changed.wait_for(
-                lambda: id in self.reports and test(self.reports[id]), patience
-            )
-            assert done, self.reports.get(id)
-        return self.reports[id]
+    def wait(self, test, id="bob"):
+        def found():
+            report = self.reports.get(id)
+            return report is not None and test(report) and report
+
+        return wait_for(found, lambda: f"a report: {self.reports.get(id)}")
 
     def take(self, id="bob"):
         self.wait(lambda report: report.armable and report.link == "up", id)
@@ -81,19 +77,12 @@ class Site:
     def stop_and_reset(self):
         self.client.stop_robot("bob")
         stopped = self.wait(lambda report: report.latched and report.stop is not None)
-        until(lambda: self.robot.twist.is_zero, "a standstill")
+        wait_for(lambda: self.robot.twist.is_zero, "a standstill")
         self.client.reset("bob", stopped.stop.id)
         self.wait(lambda report: not report.latched)
         # Only zeros were sent until now, so a goal that was not cancelled continues.
         time.sleep(0.5)
         assert self.robot.twist.is_zero
-
-
-def until(check, what):
-    deadline = time.monotonic() + 20.0
-    while not check():
-        assert time.monotonic() < deadline, what
-        time.sleep(0.02)
 
 
 @pytest.fixture(scope="module", params=REAL)
@@ -106,7 +95,7 @@ def site(request, tmp_path_factory):
             yield made
         finally:
             made.client.stop()
-            until(lambda: not made.simulator.server.sessions, "no client is left")
+            wait_for(lambda: not made.simulator.server.sessions, "no client is left")
             assert not made.simulator.server.hangs
 
 
@@ -119,9 +108,7 @@ def test_the_robots_are_found_and_the_bridge_is_left(site):
             await bridge.open()
             topics = await bridge.topics()
             removal = bridge.subscribe("/robot_1/base_scan", scans.append)
-            async with asyncio.timeout(10):
-                while len(scans) < 3:
-                    await asyncio.sleep(0.02)
+            await until(lambda: len(scans) >= 3)
             removal.remove()
         async with TemporaryBridge(site.simulator.url) as bridge:
             assert await bridge.time() is not None
@@ -140,7 +127,7 @@ def test_a_robot_drives_until_stop(site):
         site.client.twist("bob", Twist(wz=0.4))
         return site.robot.twist.wz > 0.2
 
-    until(drives, "motion")
+    wait_for(drives, "motion")
     site.stop_and_reset()
 
 
@@ -148,7 +135,7 @@ def test_stop_cancels_a_goal(site):
     site.take()
     site.client.move("bob", *FAR, 0.0)
     site.wait(lambda report: report.goal and report.goal.state == "under way")
-    until(lambda: not site.robot.twist.is_zero, "motion")
+    wait_for(lambda: not site.robot.twist.is_zero, "motion")
     site.stop_and_reset()
     assert site.reports["bob"].goal.state == "cancelled"
 

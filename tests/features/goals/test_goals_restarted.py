@@ -3,11 +3,11 @@
 import math
 import os
 import signal
-import threading
 
 import pytest
 from running_simulators import simulators
 
+from equipment.waiting import wait_for
 from webmap.gate.display.client import GateClient
 from webmap.gate.protocol import RobotReport, RobotSpec
 
@@ -25,22 +25,18 @@ class Program:
 
     def __init__(self, client):
         self._client = client
-        self._changed = threading.Condition()
         self.report = None
         client.on_report(self._hear)
 
     def _hear(self, report):
         if isinstance(report, RobotReport):
-            with self._changed:
-                self.report = report
-                self._changed.notify_all()
+            self.report = report
 
-    def wait(self, test, patience=30.0):
-        with self._changed:
-            done = self._changed.wait_for(
-                lambda: self.report is not None and test(self.report), patience
-            )
-            assert done, self.report
+    def wait(self, test):
+        wait_for(
+            lambda: self.report is not None and test(self.report),
+            lambda: f"a report: {self.report}",
+        )
 
     def go(self, place):
         self.wait(lambda report: report.armable and report.link == "up")

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import pytest
 from module_fakes import Channel
 
+from equipment.waiting import until
 from webmap import Bridge, Map, Robot
 from webmap.console.card_parts import GOALS, GoalLine, figures
 from webmap.core.base_page import PageEntry
@@ -195,9 +196,7 @@ class TestRoutes:
                 monkeypatch.setattr(tool.browser_part, "send", sent.append)
                 for number, message in enumerate(messages):
                     tool.on_message(message)
-                    async with asyncio.timeout(30):
-                        while len(sent) <= number:
-                            await asyncio.sleep(0)
+                    await until(lambda n=number: len(sent) > n)
                 page.close()
                 return sent
 

@@ -2,10 +2,10 @@
 
 import fcntl
 import os
-import time
 
 import pytest
 
+from equipment.waiting import wait_for
 from webmap.bags.ring import EventRecord, Frame
 from webmap.features.incidents import writer as writer_module
 from webmap.features.incidents.writer import (
@@ -35,13 +35,6 @@ def writer():
     made.finish()
 
 
-def until(condition, seconds=60.0):
-    deadline = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-
-
 def files(folder, kind, number, size=10):
     folder.mkdir(exist_ok=True)
     for index in range(number):
@@ -51,11 +44,11 @@ def files(folder, kind, number, size=10):
 def test_a_recording_is_made_of_what_was_put_before(writer):
     writer.put([STOPPED])
     writer.keep(asked=False)
-    until(lambda: writer.kept or writer.trouble)
+    wait_for(lambda: writer.kept or writer.trouble)
     assert writer.trouble == ""
     assert writer.kept.path in recordings(recordings_folder(), ITSELF)
     assert "MB" in writer.kept.text
-    until(lambda: not writer.is_busy)
+    wait_for(lambda: not writer.is_busy)
 
 
 def test_two_writers_have_rings_of_their_own(writer, state):
@@ -64,12 +57,12 @@ def test_two_writers_have_rings_of_their_own(writer, state):
     for each in (writer, other):
         each.put([STOPPED])
     rings = state / "incidents"
-    until(lambda: len(list(rings.glob("*/*.ring"))) == 2)
+    wait_for(lambda: len(list(rings.glob("*/*.ring"))) == 2)
     other.finish()
     third = IncidentWriter()
     third.start()
     third.put([STOPPED])
-    until(lambda: len(list(rings.glob("*/*.ring"))) == 3)
+    wait_for(lambda: len(list(rings.glob("*/*.ring"))) == 3)
     third.finish()
     assert len([each for each in rings.iterdir() if each.is_dir()]) == 2
 
@@ -94,7 +87,7 @@ def test_people_are_told_when_no_more_recordings_are_kept_for_them(writer, monke
     files(folder, ASKED, 3)
     writer.put([STOPPED])
     writer.keep(asked=True)
-    until(lambda: writer.trouble)
+    wait_for(lambda: writer.trouble)
     assert "there are 3 recordings that people asked for" in writer.trouble
     assert not writer.is_busy
     assert len(recordings(folder, ASKED)) == 3
@@ -106,7 +99,7 @@ def test_a_disk_that_refuses_is_a_sentence_and_nothing_is_raised(writer, monkeyp
 
     monkeypatch.setattr(writer_module.Ring, "write", refuse)
     writer.put([STOPPED])
-    until(lambda: writer.trouble)
+    wait_for(lambda: writer.trouble)
     assert "not recorded: No space left on device." in writer.trouble
     monkeypatch.undo()
 
@@ -115,7 +108,7 @@ def test_a_folder_that_cannot_be_made_is_a_sentence(state):
     (state / "incidents").write_text("a file")
     made = IncidentWriter()
     made.start()
-    until(lambda: made.trouble)
+    wait_for(lambda: made.trouble)
     assert made.trouble.startswith("The last minutes are not recorded:")
     for _ in range(1000):  # nobody takes them
         made.put([STOPPED])
@@ -130,7 +123,7 @@ def test_a_recording_that_was_not_finished_is_made_at_the_next_start(state):
     ring.close()
     made = IncidentWriter()
     made.start()
-    until(lambda: made.kept)
+    wait_for(lambda: made.kept)
     assert not frozen.exists()
     made.finish()
 
@@ -142,8 +135,8 @@ def test_a_recording_that_another_process_makes_is_left_to_that_process(state):
     fcntl.flock(number, fcntl.LOCK_EX)
     made = IncidentWriter()
     made.start()
-    until(lambda: made.is_busy)
-    until(lambda: not made.is_busy)
+    wait_for(lambda: made.is_busy)
+    wait_for(lambda: not made.is_busy)
     made.finish()
     assert frozen.exists()
     assert made.trouble == ""

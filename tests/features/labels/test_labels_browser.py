@@ -2,7 +2,6 @@
 
 import math
 import re
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 
@@ -12,6 +11,7 @@ from gate_words import TOO_LATE
 from playwright.sync_api import Browser, Page, expect
 
 from equipment.chromium import watched_tab
+from equipment.waiting import wait_for
 from equipment.webmap_process import page_of, simulator, webmap
 
 pytestmark = pytest.mark.browser
@@ -278,9 +278,6 @@ def test_a_label_can_send_the_selected_robot_to_its_position(chromium, serve, br
             label(tab, "Äpfel <b>").press("Enter")  # this removes the text
         expect(status).to_have_text("Goal sent to Äpfel <b>.")
         expect(tab.locator(".robot.selected")).to_have_count(1)
-        deadline = time.monotonic() + 10
-        while not node.received and time.monotonic() < deadline:
-            tab.wait_for_timeout(20)
-        ((_, message),) = node.received
+        ((_, message),) = wait_for(lambda: node.received, "the goal", page=tab)
         position = message["pose"]["position"]
         assert (position["x"], position["y"]) == pytest.approx((3.0, 2.0))

@@ -18,17 +18,10 @@ import pytest
 from module_fakes import dots, header, pose, typed
 from websockets.asyncio.server import serve
 
+from equipment.waiting import polls, until
 from webmap import Bridge, Robot
 
 pytestmark = pytest.mark.slow
-
-DEADLINE = 20.0
-
-
-async def until(condition):
-    async with asyncio.timeout(DEADLINE):
-        while not condition():
-            await asyncio.sleep(0.005)
 
 
 class Server:
@@ -306,11 +299,8 @@ class Scene:
         before = self.state(number)
         for topic, make in GOOD.items():
             await self.servers[number].send(publish(topic, make(x)))
-        changed = lambda: [t for t, s in self.state(number).items() if s == before[t]]  # noqa: E731
-        async with asyncio.timeout(DEADLINE):
-            while left := changed():
-                await asyncio.sleep(0.005)
-                del left
+        kept = lambda: [t for t, s in self.state(number).items() if s == before[t]]  # noqa: E731
+        await until(lambda: not kept(), lambda: f"a new drawing of {kept()}")
         return self.state(number)
 
 
@@ -508,10 +498,11 @@ def test_a_scan_of_two_million_rays_is_refused_without_blocking_another_robot(
             "/odom", lambda message: seen.append(time.monotonic())
         )
         sending = asyncio.create_task(scene.servers[0].send(BEAMS))
-        async with asyncio.timeout(3 * DEADLINE):
-            while scene.errors == []:
-                await scene.servers[1].send(publish("/odom", odometry(4.0)))
-                await asyncio.sleep(0.01)
+        for _ in polls("the error", 60.0):
+            if scene.errors:
+                break
+            await scene.servers[1].send(publish("/odom", odometry(4.0)))
+            await asyncio.sleep(0.01)
         await sending
         assert max(np.diff(seen)) < 1.0, "the other robot was still updated"
         (line,) = scene.errors

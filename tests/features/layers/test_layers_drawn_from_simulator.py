@@ -8,7 +8,6 @@ import io
 import math
 import re
 import threading
-import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -21,6 +20,7 @@ from playwright.sync_api import Browser, Page, expect
 from running_simulators import Running, simulators
 
 from equipment.chromium import watched_tab
+from equipment.waiting import wait_for
 from equipment.webmap_process import page_of
 from webmap.base.geometry import Pose
 from webmap.sim.navigator import SimGoal
@@ -137,12 +137,9 @@ def tab(chromium: Browser, url: str, running: Running, worlds) -> Iterator[Page]
         yield page
 
 
-def until(look, wanted, what: str, seconds: float = 15) -> None:
+def until(look, wanted, what: str) -> None:
     """Wait until the result of ``look`` satisfies ``wanted``."""
-    deadline = time.monotonic() + seconds
-    while not wanted(found := look()):
-        assert time.monotonic() < deadline, f"{what}: {found}"
-        time.sleep(0.03)
+    wait_for(lambda: wanted(look()), lambda: f"{what}, not {look()}")
 
 
 def near(tab: Page, script: str, wanted, within: float, what: str) -> None:

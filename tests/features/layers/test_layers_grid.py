@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from module_fakes import header, image_of, images, pixel, pose, typed
 
+from equipment.waiting import until
 from webmap import Map
 from webmap.base.geometry import Affine
 from webmap.core.layer import Layer
@@ -256,9 +257,8 @@ def test_a_large_grid_is_drawn_in_the_background_and_the_newest_is_shown(map, li
 
 async def drawn(module) -> None:
     """Wait until the tiles of a grid are drawn."""
-    async with asyncio.timeout(30):
-        while module.layer.tiles.is_drawing or module.layer._copying:
-            await asyncio.sleep(0.005)
+    layer = module.layer
+    await until(lambda: not layer.tiles.is_drawing and not layer._copying)
 
 
 def test_a_grid_becomes_stale_only_with_an_age_limit(map, link):

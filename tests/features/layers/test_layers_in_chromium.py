@@ -2,7 +2,6 @@
 
 import io
 import math
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from PIL import Image
 from playwright.sync_api import Browser, Page, expect
 
 from equipment.chromium import watched_tab
+from equipment.waiting import wait_for
 from equipment.webmap_process import page_of
 
 pytestmark = pytest.mark.browser
@@ -72,9 +72,11 @@ def colours(tab: Page, *places: tuple[float, float]) -> list[tuple[int, ...]]:
 
 def await_colours(tab: Page, wanted: list, *places: tuple[float, float]) -> None:
     """Wait until images are drawn; they have addresses before they have pixels."""
-    deadline = time.monotonic() + 15
-    while (found := colours(tab, *places)) != wanted:
-        assert time.monotonic() < deadline, f"other colours are drawn: {found}"
+    wait_for(
+        lambda: colours(tab, *places) == wanted,
+        lambda: f"{wanted}, not {colours(tab, *places)}",
+        page=tab,
+    )
 
 
 def floor(x: float, y: float) -> tuple[float, float]:

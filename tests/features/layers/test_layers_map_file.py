@@ -13,6 +13,7 @@ import pytest
 from module_fakes import image_of, images, pixel
 from PIL import Image
 
+from equipment.waiting import until
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Affine
 from webmap.base.map_file import read_map
@@ -141,10 +142,8 @@ def test_scale_and_raw_modes_give_the_values_of_map_server(tmp_path):
 def in_a_page(scenario):
     async def run():
         module = scenario()
-        deadline = time.monotonic() + 20
-        while module.layer.image is None and not module.layer.problems:
-            assert time.monotonic() < deadline
-            await asyncio.sleep(0.005)
+        layer = module.layer
+        await until(lambda: layer.image is not None or layer.problems)
         return module
 
     return asyncio.run(run())

@@ -2,11 +2,11 @@
 
 import asyncio
 import math
-import time
 
 import pytest
 from module_fakes import header, numbers, pose, to_root
 
+from equipment.waiting import until
 from webmap import Map
 
 ARROW, CUBE, SPHERE, CYLINDER, STRIP, LINES = range(6)
@@ -290,11 +290,6 @@ def test_markers_beyond_the_limit_are_left_out_and_counted_in_a_notice(
     monkeypatch.setattr("webmap.features.layers.markers.MAX_MARKERS", 10)
     monkeypatch.setattr("webmap.features.layers.markers.SETTLED", 0.01)
 
-    async def until(check):
-        async with asyncio.timeout(10):
-            while not check():
-                await asyncio.sleep(0.005)
-
     async def scenario():
         layer = map.add_module("Markers", link, "/markers").layer
         publish(link, *(marker(CUBE, id=i) for i in range(11)))
@@ -340,10 +335,7 @@ def test_a_marker_is_removed_after_its_lifetime_unless_it_is_sent_again(
         )
         publish(link, marker(CUBE, id=3))
         assert len(layer.svg.children) == 3
-        deadline = time.monotonic() + 10
-        while len(layer.svg.children) == 3:
-            assert time.monotonic() < deadline
-            await asyncio.sleep(0.005)
+        await until(lambda: len(layer.svg.children) != 3)
         assert [shape.get("data-id") for shape in layer.svg.children] == ["2", "3"]
 
     asyncio.run(scenario())

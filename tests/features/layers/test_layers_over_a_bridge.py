@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from module_fakes import images, pixel
 
+from equipment.waiting import until
 from webmap import Bridge, Map
 from webmap.core.page import Page
 from webmap.sim.maps import FLOOR, load_map
@@ -98,10 +99,3 @@ def check(layer) -> None:
         assert drawn == value, (row, column)
         seen.add(value)
     assert len(seen) > 1
-
-
-async def until(condition) -> None:
-    deadline = time.monotonic() + 30
-    while not condition():
-        assert time.monotonic() < deadline
-        await asyncio.sleep(0.01)

@@ -1,7 +1,6 @@
 """The pixels that each type of marker covers in a real browser."""
 
 import io
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from playwright.sync_api import Browser
 from shapes_of_markers import BLUE, RED, SHAPES
 
 from equipment.chromium import watched_tab
+from equipment.waiting import wait_for
 from equipment.webmap_process import page_of
 
 pytestmark = pytest.mark.browser
@@ -42,9 +42,7 @@ def colours(chromium: Browser) -> Iterator:
             pixels = tab.evaluate(PIXELS, list(places))
             return [picture.getpixel((round(u), round(v))) for u, v in pixels]
 
-        deadline = time.monotonic() + 10
-        while found([SHAPES["cube"].at]) != [BLUE]:
-            assert time.monotonic() < deadline, "nothing is drawn in time"
+        wait_for(lambda: found([SHAPES["cube"].at]) == [BLUE], "a cube", page=tab)
         yield found
 
 

@@ -6,6 +6,7 @@ import math
 import pytest
 from module_fakes import dots, header, pose, to_root
 
+from equipment.waiting import until
 from webmap import Bridge, Map, Robot
 from webmap.testing.witness import WitnessRobot
 
@@ -24,12 +25,6 @@ SCAN = {
     "range_max": 9.0,
     "ranges": [3.0],
 }
-
-
-async def until(condition) -> None:
-    async with asyncio.timeout(10):
-        while not condition():
-            await asyncio.sleep(0.005)
 
 
 def test_a_scan_of_one_bridge_is_placed_by_the_poses_of_another_bridge(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from module_fakes import images, pixel
 
+from equipment.waiting import until
 from webmap import Bridge
 from webmap.features.layers import occupancy_grid
 from webmap.ros.rosbridge.events import Publish
@@ -40,9 +41,7 @@ def test_updates_that_overtake_a_grid_in_the_throttle_are_drawn_on_it(map, page)
         assert layer.cells.shape == (4, 8)
         assert lethal(layer) == [], "an update waits for the grid that it belongs to"
         assert layer.problems
-        async with asyncio.timeout(10):
-            while layer.cells.shape != (4, 12):
-                await asyncio.sleep(0.01)
+        await until(lambda: layer.cells.shape == (4, 12))
         assert lethal(layer) == LETHAL
         assert layer.problems == {}
         page.close()

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from scene_of_tiles import DATUM, EAST, made_tiles, number
 
+from equipment.waiting import until
 from webmap.base.errors import ConfigError
 from webmap.core.pictures import PREFIX, pictures
 from webmap.features.tiles import tile_layer
@@ -24,10 +25,8 @@ def test_removing_the_tile_layer_releases_its_tiles(map, tiles, channel):
         before = len(pictures)
         map.fit(-200, -150, 400, 300)
         layer = map.add_module("TileLayer", tiles, DATUM, east=EAST, most=12)
-        for _ in range(500):
-            await asyncio.sleep(0.01)
-            if layer._looking is None:
-                break
+        await asyncio.sleep(0)
+        await until(lambda: layer._looking is None)
         assert 4 <= len(layer.shown) <= 12
         assert len(pictures) > before
         urls = [shown.url for shown in layer.shown.values() if shown]
@@ -50,10 +49,8 @@ def test_invalid_tiles_give_one_notice_and_the_others_are_drawn(map, channel, tm
     async def scenario():
         map.fit(-200, -150, 400, 300)
         layer = map.add_module("TileLayer", tmp_path, DATUM)
-        for _ in range(500):
-            await asyncio.sleep(0.01)
-            if layer._looking is None:
-                break
+        await asyncio.sleep(0)
+        await until(lambda: layer._looking is None)
         drawn = [tile for tile, shown in layer.shown.items() if shown]
         map.remove_module(layer)
         return drawn

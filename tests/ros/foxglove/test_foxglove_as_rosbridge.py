@@ -4,13 +4,13 @@ import asyncio
 
 import pytest
 
-from equipment.fake_rosbridge import until
 from equipment.foxglove_server import (
     SERVICE,
     VELOCITY,
     old_server,
     sdk_server,
 )
+from equipment.waiting import until
 from webmap.base.errors import BridgeClosed, ServiceError
 from webmap.ros import bridge as bridge_module
 from webmap.ros import names
@@ -56,7 +56,7 @@ def run(scenario, kind="sdk"):
             async with old_server() as server, Display(server.url) as display:
                 await scenario(server, display)
 
-    asyncio.run(asyncio.wait_for(with_server(), 60))
+    asyncio.run(with_server())
 
 
 @pytest.fixture(params=["sdk", "old"])

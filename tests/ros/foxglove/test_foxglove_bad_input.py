@@ -9,7 +9,7 @@ from contextlib import asynccontextmanager
 import pytest
 from websockets.asyncio.server import serve
 
-from equipment.fake_rosbridge import until
+from equipment.waiting import until
 from webmap.base.errors import BridgeClosed, BridgeError, ProtocolError, ServiceError
 from webmap.ros.foxglove import calls, link, session
 from webmap.ros.limits import MAX_FRAME
@@ -21,7 +21,7 @@ HELLO = b"\0\1\0\0\6\0\0\0hello\0"
 
 
 def run(scenario):
-    asyncio.run(asyncio.wait_for(scenario(), 60))
+    asyncio.run(scenario())
 
 
 def text(**fields):

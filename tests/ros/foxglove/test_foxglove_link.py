@@ -6,13 +6,14 @@ from contextlib import asynccontextmanager
 import pytest
 from foxglove.websocket import Capability
 
-from equipment.fake_rosbridge import FakeRosbridge, until
+from equipment.fake_rosbridge import FakeRosbridge
 from equipment.foxglove_server import (
     SERVICE,
     VELOCITY,
     old_server,
     sdk_server,
 )
+from equipment.waiting import until
 from webmap.base.errors import BridgeClosed, BridgeError, ServiceError
 from webmap.ros.bridge import Bridge
 from webmap.ros.foxglove import address
@@ -25,7 +26,7 @@ ODOM = {"/odom": ("nav_msgs/Odometry", None, 0)}
 
 
 def run(scenario):
-    asyncio.run(asyncio.wait_for(scenario(), 60))
+    asyncio.run(scenario())
 
 
 @asynccontextmanager
@@ -238,7 +239,6 @@ def test_nodes_are_known_when_the_server_names_them():
             async with bridged(server) as bridge:
                 await until(lambda: bridge._link._main.info)
                 assert await bridge.publishers("/odom") is None
-                await asyncio.sleep(0.2)  # until the server has its subscription
                 server.graph({"/odom": ["/base", "/foxglove_bridge"]}, {"/odom": []})
                 await until(lambda: bridge._link._main.publishers)
                 nodes = await bridge.publishers("/odom")

@@ -2,11 +2,11 @@
 
 import asyncio
 import math
-import time
 
 import msgspec
 import pytest
 
+from equipment.waiting import until
 from equipment.webmap_process import simulator
 from webmap import Bridge, Robot
 from webmap.base.errors import ConfigError
@@ -229,18 +229,17 @@ async def follow(url):
         robot.set_odometry_topic(bridge, "/robot_0/odom", 0)
         robot.set_tf(bridge)
         buffer = frames_of(bridge).buffer
-        deadline = time.monotonic() + 15
-        while time.monotonic() < deadline:
-            await asyncio.sleep(0.02)
-            if not robot.valid or not {"map", "robot_0/base_link"} <= set(
-                buffer.frames
-            ):
-                continue
+
+        def is_placed():
+            if not robot.valid or not wanted <= set(buffer.frames):
+                return False
             truth = buffer.lookup("map", "robot_0/base_link").planar
             off = math.dist((truth.x, truth.y), (robot.position.x, robot.position.y))
-            if off < 0.1 and not robot.problems:
-                return
-        raise AssertionError(f"{robot.problems}, {buffer.frames}")
+            return off < 0.1 and not robot.problems
+
+        wanted = {"map", "robot_0/base_link"}
+        state = lambda: f"the pose: {robot.problems}, {buffer.frames}"  # noqa: E731
+        await until(is_placed, state)
     finally:
         robot.destroy()
         await bridge.stop()

@@ -6,6 +6,7 @@ import time
 import pytest
 from test_tf_robot import Link, transform
 
+from equipment.waiting import until
 from webmap import Robot
 from webmap.poses.frames import PERIOD, frames_of
 
@@ -22,13 +23,6 @@ class OpenLink(Link):
 
 def moved(x, stamp) -> dict:
     return {"transforms": [transform("map", "base_link", x, stamp=stamp)]}
-
-
-async def until(condition) -> None:
-    deadline = time.monotonic() + 10.0
-    while not condition():
-        assert time.monotonic() < deadline
-        await asyncio.sleep(0.005)
 
 
 def test_a_raising_frame_listener_is_logged_once_and_others_are_still_called(caplog):
