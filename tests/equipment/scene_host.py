@@ -113,7 +113,7 @@ class SceneHost:
 
     def __enter__(self) -> "SceneHost":
         self._thread.start()
-        self.until(lambda: self._server.started)
+        wait_for(lambda: self._server.started)
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -214,7 +214,9 @@ def test_suppress_next_click_discards_one_click(host, tab, open_map):
     tab.mouse.click(100, 100)
     tab.evaluate("window.once.abort()")
     tab.mouse.click(200, 200)
-    clicks = wait_for(lambda: [e for e in shown.events if hasattr(e, "event")], tab=tab)
+    clicks = wait_for(
+        lambda: [e for e in shown.events if hasattr(e, "event")], page=tab
+    )
     assert [click.x for click in clicks] == [190]
 
 
@@ -228,9 +230,13 @@ def test_a_module_receives_the_selected_robot(host, tab, open_map):
     (first,) = host.events(ModuleMessage)
     assert first.data == {"options": {"speed": 2}, "selected": None, "width": 700}
     host.call(shown.session.set_class, shown.inner, "selected", True)
-    wait_for(lambda: host.events(ModuleMessage)[-1].data == {"selected": "r1"}, tab=tab)
+    wait_for(
+        lambda: host.events(ModuleMessage)[-1].data == {"selected": "r1"}, page=tab
+    )
     host.call(shown.session.unmount, shown.inner)
-    wait_for(lambda: host.events(ModuleMessage)[-1].data == {"selected": None}, tab=tab)
+    wait_for(
+        lambda: host.events(ModuleMessage)[-1].data == {"selected": None}, page=tab
+    )
     color = "getComputedStyle(document.querySelector('.overlay > .half')).fill"
     wait(tab, f"{color} === 'rgb(255, 0, 0)'")
     assert on_map(tab, "return typeof map.drive.on") == "function"
