@@ -10,6 +10,7 @@ from equipment.foxglove_server import live, old_server, sdk_server
 from webmap.discovery.doctor import judge
 from webmap.discovery.doctor.measure import observe, tried
 from webmap.ros.foxglove import advice
+from webmap.ros.rosbridge.advice import client_writes
 from webmap.ros.rosbridge.checks import LinkFacts
 
 
@@ -76,6 +77,11 @@ def test_who_reaches_a_foxglove_bridge(facts, url, level, part):
     finding = next(advice.findings(facts, url))
     assert finding.level == level
     assert part in finding.text
+
+
+def test_a_writer_through_a_foxglove_bridge_is_no_client_of_a_rosbridge():
+    finding = client_writes("Bob", "/cmd_vel", ["/foxglove_bridge"])
+    assert "A client of a bridge (/foxglove_bridge) writes to /cmd_vel" in finding.text
 
 
 def test_webmap_discover_lists_the_robot():

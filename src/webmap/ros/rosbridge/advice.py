@@ -261,7 +261,7 @@ def type_not_certain(robot: str, topic: str, type: str) -> Finding:
 
 
 def client_writes(robot: str, topic: str, nodes: Sequence[str]) -> Finding:
-    """Return the finding that a client of a rosbridge publishes velocity.
+    """Return the finding that a client of a bridge publishes velocity.
 
     Args:
         robot: The name of the robot with this velocity topic.
@@ -272,6 +272,6 @@ def client_writes(robot: str, topic: str, nodes: Sequence[str]) -> Finding:
     return Finding(
         "note",
         robot,
-        f"A client of a rosbridge ({', '.join(nodes)}) writes to "
+        f"A client of a bridge ({', '.join(nodes)}) writes to "
         f"{topic} now; it may be WebMap itself.",
     )
