@@ -136,7 +136,7 @@ class SdkRobot(FoxgloveRobot):
 class OldRobot(FoxgloveRobot):
     """A robot behind foxglove_bridge 0.8.5: one thread handles what all clients send.
 
-    Another thread reads the sockets, and answers pings.
+    Another thread reads the sockets, greets clients and answers pings.
     """
 
     subprotocol = "foxglove.websocket.v1"
@@ -191,7 +191,7 @@ class OldRobot(FoxgloveRobot):
 
     async def _serve(self, socket):
         id = object()
-        self._queue.put((self._open, id, socket))
+        self._open(id, socket)
         try:
             async for frame in socket:
                 self._queue.put((self._on_frame, id, frame))

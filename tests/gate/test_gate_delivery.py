@@ -202,24 +202,56 @@ class TestEchoes:
 
 
 class TestStandstill:
-    def test_a_stop_is_confirmed_only_when_no_velocity_waits(self):
+    @pytest.fixture
+    def driven(self):
+        """A bench whose operator drives, and a function that continues for a while."""
         robot = declared(odometry_topic="/odom", odometry_type="nav_msgs/Odometry")
         bench = OldBench().begin(robot)
         bench.take()
         bench.run(0.1)
 
-        def drive():
+        def each():
             bench.handle(events.OdometryReceived(KEY, ZERO))
             bench.drive(x=0.5 if bench.report().armed else 0.0)
 
-        bench.run(0.6, drive)
+        bench.run(0.6, each)
+        assert bench.written[-1].twist == Twist(0.5)
+        return bench, lambda seconds: bench.run(seconds, each)
+
+    def test_a_stop_is_confirmed_only_when_no_velocity_waits(self, driven):
+        bench, drive_on = driven
         bench.echoing = False
-        bench.run(0.1, drive)
+        drive_on(0.1)
         bench.send("a", op="stop", robot="r1")
         bench.odometry(seconds=0.6)
         assert not bench.report().stop.confirmed
         bench.echo(Twist(0.5), times=10)
         bench.odometry()
+        assert bench.report().stop.confirmed
+
+    def test_a_new_connection_alone_does_not_confirm_a_stop(self, driven):
+        """The bridge greets clients while its other thread still holds velocities."""
+        bench, drive_on = driven
+        bench.echoing = False
+        drive_on(STALL_LIMIT + 0.2)
+        assert len(bench.did(actions.CutLink)) == 1
+        bench.connect_links()
+        bench.send("a", op="stop", robot="r1")
+        bench.odometry(seconds=STALL_LIMIT + 0.5)
+        assert not bench.report().stop.confirmed
+        assert len(bench.did(actions.CutLink)) == 1
+        bench.echoing = True
+        bench.odometry()
+        assert bench.report().stop.confirmed
+
+    def test_a_newer_bridge_holds_no_velocity_of_the_older_one(self, driven):
+        bench, drive_on = driven
+        bench.echoing = False
+        drive_on(0.1)
+        bench.handle(events.LinkDown(URL, "control"))
+        bench.handle(events.LinkUp(URL, "control"))
+        bench.send("a", op="stop", robot="r1")
+        bench.odometry(seconds=0.6)
         assert bench.report().stop.confirmed
 
     def test_a_zero_is_owed_until_no_velocity_waits(self, old):

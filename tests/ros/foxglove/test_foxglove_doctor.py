@@ -10,6 +10,7 @@ from equipment.foxglove_server import live, old_server, sdk_server
 from webmap.discovery.doctor import judge
 from webmap.discovery.doctor.measure import observe, tried
 from webmap.ros.foxglove import advice
+from webmap.ros.rosbridge.advice import client_writes, type_not_certain
 from webmap.ros.rosbridge.checks import LinkFacts
 
 
@@ -76,6 +77,14 @@ def test_who_reaches_a_foxglove_bridge(facts, url, level, part):
     finding = next(advice.findings(facts, url))
     assert finding.level == level
     assert part in finding.text
+
+
+def test_findings_about_velocity_name_no_rosbridge():
+    writes = client_writes("Bob", "/cmd_vel", ["/foxglove_bridge"])
+    assert "A client of a bridge (/foxglove_bridge) writes to /cmd_vel" in writes.text
+    uncertain = type_not_certain("Bob", "/cmd_vel", "Twist")
+    assert "The bridge names the type Twist for /cmd_vel" in uncertain.text
+    assert "ros" not in uncertain.text
 
 
 def test_webmap_discover_lists_the_robot():

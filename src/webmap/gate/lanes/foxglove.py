@@ -1,8 +1,7 @@
 """How a lane speaks to a bridge of Foxglove.
 
 A server begins a connection with ``serverInfo``, and only then is the lane up: it names
-the encoding of what clients publish. ``foxglove_bridge`` up to 0.8.5 sends it in the
-thread that handles messages, so those of earlier connections have been handled.
+the encoding of what clients publish.
 
 The server offers topics as channels, each with a number of this connection, at any
 time; a topic is subscribed when its channel is offered. The numbers of what the gate

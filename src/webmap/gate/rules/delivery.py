@@ -60,13 +60,14 @@ class Delivery:
         return self.up and self.only_echoes and not self._returned
 
     def opened(self) -> None:
-        """Note a new connection: all of the earlier one was handled or is lost.
+        """Note a new connection.
 
-        A bridge that answers pings in another thread greets a client in the thread that
-        handles messages, so it has handled those of earlier connections by then.
+        A bridge that answers pings in another thread greets clients there too, so
+        velocities of earlier connections may still wait in the first thread.
         """
         self._returned = False
-        self._waiting.clear()
+        if not self.only_echoes:
+            self._waiting.clear()
 
     def on_written(self, twist: Twist, now: float) -> None:
         """Note a velocity that was written."""
@@ -77,7 +78,9 @@ class Delivery:
         """Note a velocity received on the velocity topic, of whoever published it."""
         if not self.only_echoes:
             return
-        self._returned = True
+        if not self._returned:  # the thread has handled all before the subscription
+            self._returned = True
+            self._waiting.clear()
         for at, sent in self._waiting:
             if sent == twist:
                 while self._waiting and self._waiting[0][0] <= at:
@@ -101,9 +104,10 @@ class Delivery:
     def stalled(self, now: float) -> bool:
         """Return whether an echo is missing for so long that the link must be cut.
 
-        It may also be lost; then the next connection shows that nothing waits.
+        It may also be lost; then the first velocity that the next connection receives
+        shows that nothing waits. So that connection is not cut before.
         """
-        return self.up and self._late(now) > STALL_LIMIT
+        return self.up and self._returned and self._late(now) > STALL_LIMIT
 
     def answered_since(self, then: float) -> bool:
         """Return whether what was written at ``then`` has arrived.

@@ -357,16 +357,20 @@ class Machine:
         self.check.take(lock.checked, now)
         if lock.driven:
             self.motion.owe_zero()
-            self.link_up(now)
+            self._begin_link(now)
         if lock.held and lock.latched is not None and self.latch.is_new(lock.latched):
             self.latch.found(lock.latched)
             self._send_stop(now)
 
     def link_up(self, now: float) -> None:
-        """Send an owed zero first, then an active STOP: the control link is open."""
+        """Begin a new connection of the control link."""
+        self.delivery.opened()
+        self._begin_link(now)
+
+    def _begin_link(self, now: float) -> None:
+        """Send an owed zero first, then an active STOP, if the control link is open."""
         if not self.control.up:
             return
-        self.delivery.opened()
         # Velocities of an earlier gate or an earlier link may still arrive as echoes.
         self.other_writer.expect(now + EXPECTED_FOR)
         if self.motion.owes_zero:

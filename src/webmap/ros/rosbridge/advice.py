@@ -241,7 +241,7 @@ MAYBE_TOO_LARGE = (
 def type_not_certain(robot: str, topic: str, type: str) -> Finding:
     """Return the finding that the reported type may be that of another client.
 
-    rosapi reports one type of a topic; of two types, the first in the alphabet.
+    rosapi reports one type of a topic: of two types, the first in the alphabet.
 
     Args:
         robot: The name of the robot with this velocity topic.
@@ -252,16 +252,16 @@ def type_not_certain(robot: str, topic: str, type: str) -> Finding:
     return Finding(
         "note",
         robot,
-        f"rosapi names {type} for {topic}, and a client of a rosbridge, "
-        f"which may be WebMap itself, has announced that type, so rosapi cannot "
-        f"show whether the base takes TwistStamped.",
+        f"The bridge names the type {type} for {topic}, and a client of a bridge, "
+        f"which may be WebMap itself, has announced that type, so WebMap cannot see "
+        f"whether the base takes TwistStamped.",
         f"Look on the robot: ros2 topic info -v {topic}. A base that "
         f"takes another type would neither move nor stop.",
     )
 
 
 def client_writes(robot: str, topic: str, nodes: Sequence[str]) -> Finding:
-    """Return the finding that a client of a rosbridge publishes velocity.
+    """Return the finding that a client of a bridge publishes velocity.
 
     Args:
         robot: The name of the robot with this velocity topic.
@@ -272,6 +272,6 @@ def client_writes(robot: str, topic: str, nodes: Sequence[str]) -> Finding:
     return Finding(
         "note",
         robot,
-        f"A client of a rosbridge ({', '.join(nodes)}) writes to "
+        f"A client of a bridge ({', '.join(nodes)}) writes to "
         f"{topic} now; it may be WebMap itself.",
     )
