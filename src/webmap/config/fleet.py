@@ -49,6 +49,12 @@ class MapConfig(Config, kw_only=True, frozen=True):
     palette: Literal["map", "costmap", "raw"] | None = None
     order: Annotated[float, checks.finite("a number; robots have 100")] | None = None
 
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options of ``Console.add_grid`` that it has."""
+        options = {"palette": self.palette, "order": self.order}
+        return {key: value for key, value in options.items() if value is not None}
+
 
 class ImageConfig(Config, kw_only=True, frozen=True):
     """A picture under everything else."""

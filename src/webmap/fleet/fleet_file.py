@@ -245,9 +245,7 @@ def show_scenery(shown: console.Console, ready: ReadyFleet) -> None:
     for image in ready.images:
         shown.add_image(*image)
     for grid in ready.fleet.map:
-        options = {"palette": grid.palette, "order": grid.order}
-        chosen = {key: value for key, value in options.items() if value is not None}
-        shown.add_grid(ready.bridges[grid.bridge], grid.topic, **chosen)
+        shown.add_grid(ready.bridges[grid.bridge], grid.topic, **grid.options)
     for module in ready.others:
         shown.add_module(module.name, *module.args, **module.options)
 
@@ -260,9 +258,6 @@ def restore(robots: "list[Robot]") -> None:
 
 PICTURES = (".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".svg", ".tif", ".tiff")
 """Suffixes of pictures; such a file in place of a YAML file is a common mistake."""
-
-NEEDED = ("name", "x", "y")
-"""The required keys of a label."""
 
 
 def check_floor(floor: Path, mistakes: Mistakes) -> None:
@@ -330,8 +325,7 @@ def label_options(places: Any, folder: Path, mistakes: Mistakes) -> dict[str, An
 
     """
     if not isinstance(places, str):
-        for index, each in enumerate(places):
-            _check_label(each, ("labels", index), mistakes)
+        read_labels(places, ("labels",), mistakes)
         return {"labels": places}
     file = folder / places
     try:
@@ -339,21 +333,6 @@ def label_options(places: Any, folder: Path, mistakes: Mistakes) -> dict[str, An
     except ConfigError as error:
         mistakes.add(("labels",), str(error))
     return {"file": str(file.absolute())}
-
-
-def _check_label(label: Any, path: KeyPath, mistakes: Mistakes) -> None:
-    there = label if isinstance(label, dict) else NEEDED
-    missing = [key for key in NEEDED if key not in there]
-    for key in missing:
-        mistakes.add(path, f'the key "{key}" is missing')
-    if missing:
-        return
-    try:
-        read_labels([label], "")
-    except ConfigError as error:
-        # The label was read as item 0 of a list; its index in the file may differ.
-        _, *inner = getattr(error, "path", (0,))
-        mistakes.add((*path, *inner), getattr(error, "text", str(error)))
 
 
 def tile_options(
