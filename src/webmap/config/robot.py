@@ -14,7 +14,7 @@ from webmap.config import checks
 from webmap.config.buttons import check_buttons
 from webmap.config.checks import KeyPath, Mistakes
 from webmap.config.motion import MotionConfig, TopicConfig
-from webmap.config.reading import ONE_OR_MORE, Config, ReadBy, read, tables_of
+from webmap.config.reading import ONE_OR_MORE, Config, ReadBy, read
 from webmap.ros.image_address import EXAMPLE, parse_address
 from webmap.ros.names import PICTURES, VIDEO, is_topic, is_type
 
@@ -29,6 +29,9 @@ ODOMETRY_TYPES = (
 
 MOTION = tuple(MotionConfig.__struct_fields__)
 """Keys of a robot's table that are parts of its motion."""
+
+LINKED = ("odometry", "tf", "twist", "move", "initial_pose")
+"""Keys of the parts that use a bridge."""
 
 
 class OdometryConfig(TopicConfig, kw_only=True, frozen=True):
@@ -350,13 +353,6 @@ class RobotConfig(Config, kw_only=True, frozen=True):
         return layers + [
             ModuleEntry(("modules", index), module) for index, module in listed
         ]
-
-
-PARTS = tables_of(RobotConfig, "odometry", "tf") | tables_of(MotionConfig)
-"""The parts of a robot that are no modules, by their keys."""
-
-LINKED = tuple(key for key, part in PARTS.items() if "bridge" in part.__struct_fields__)
-"""Parts that use a bridge."""
 
 
 def read_robot(value: Any, path: KeyPath, mistakes: Mistakes) -> RobotConfig | None:
