@@ -11,10 +11,10 @@ import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.config import checks
-from webmap.config.buttons import check_buttons
+from webmap.config.buttons import ButtonConfig, check_labels
 from webmap.config.checks import KeyPath, Mistakes
 from webmap.config.motion import MotionConfig, TopicConfig
-from webmap.config.reading import ONE_OR_MORE, Config, ReadBy, read
+from webmap.config.reading import ONE_OR_MORE, Config, read
 from webmap.ros.image_address import EXAMPLE, parse_address
 from webmap.ros.names import PICTURES, VIDEO, is_topic, is_type
 
@@ -175,21 +175,6 @@ Alignment = Annotated[
 counter-clockwise."""
 
 
-def _any_table(value: Any) -> dict[str, Any]:
-    if not isinstance(value, Mapping):
-        raise ConfigError("a table of keys and values")
-    return dict(value)
-
-
-def _buttons(value: Any, path: KeyPath, mistakes: Mistakes) -> list[dict[str, Any]]:
-    if not isinstance(value, list | tuple):
-        message = "expected a table [[robots.buttons]] for each"
-        mistakes.add(path, f"got {checks.show(value)}, {message}")
-        return []
-    check_buttons(value, path, mistakes)
-    return [dict(each) for each in value if isinstance(each, Mapping)]
-
-
 OWN_CLASSES = ("robot", "unplaced", "selected", "stale")
 """CSS classes that WebMap itself gives to a robot."""
 
@@ -241,12 +226,17 @@ class RobotConfig(Config, kw_only=True, frozen=True):
     """Words by which the list of robots is grouped; the first one is the group."""
     cameras: Annotated[list[CameraConfig], ONE_OR_MORE] = []
     motion: MotionConfig = MotionConfig()
-    buttons: Annotated[list[dict[str, Any]], ReadBy(_buttons)] = []
-    """The arguments of the module ``Buttons``."""
+    buttons: list[ButtonConfig] = []
     modules: list[ModuleConfig] = []
     classes: list[Annotated[str, _css_class]] = []
     """CSS classes."""
-    model: Annotated[dict[str, Any], _any_table] | None = None
+    model: (
+        Annotated[
+            dict[str, Any],
+            checks.expecting("a table of keys and values", checks.table),
+        ]
+        | None
+    ) = None
     """The drawing: an element as plain data."""
 
     @classmethod
@@ -283,6 +273,7 @@ class RobotConfig(Config, kw_only=True, frozen=True):
 
     def check(self, path: KeyPath, mistakes: Mistakes) -> None:
         """Add mistakes that concern several fields."""
+        check_labels(self.buttons, (*path, "buttons"), mistakes)
         if self.picture is not None and self.model is not None:
             message = 'a robot has a "picture" or a "model"; remove one of them'
             mistakes.add((*path, "picture"), message)
@@ -336,7 +327,8 @@ class RobotConfig(Config, kw_only=True, frozen=True):
             battery = ModuleConfig(name="Battery", args=[link, self.battery])
             layers.append(ModuleEntry(("battery",), battery))
         if self.buttons:
-            buttons = ModuleConfig(name="Buttons", args=[link, self.buttons])
+            each = msgspec.to_builtins(self.buttons)
+            buttons = ModuleConfig(name="Buttons", args=[link, each])
             layers.append(ModuleEntry(("buttons",), buttons))
         for index, camera in enumerate(named_cameras(self.cameras)):
             throttle = camera.throttle
