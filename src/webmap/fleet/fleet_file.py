@@ -5,7 +5,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -22,7 +22,7 @@ from webmap.core.alignment_store import store
 from webmap.core.module_arguments import WrongArguments, check_arguments
 from webmap.core.pictures import pictures
 from webmap.core.registry import map_modules
-from webmap.core.robot import module_call, wrong_argument
+from webmap.core.robot import ModuleCall, module_call, wrong_argument
 from webmap.features.labels.label_store import label_file, read_labels
 from webmap.features.tiles.tile_source import open_tiles
 from webmap.fleet.remote_robots import find_agents
@@ -34,14 +34,6 @@ if TYPE_CHECKING:
     from webmap import Bridge, Robot
 
 log = logging.getLogger("webmap.cli")
-
-
-class MapModule(NamedTuple):
-    """A module of the key ``modules``, with the arguments of its constructor."""
-
-    name: str
-    args: tuple[Any, ...]
-    options: dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +48,7 @@ class ReadyFleet:
     """Modules of the map with their arguments, by their names."""
     images: list[tuple[str, float, float, float, float]]
     """Pictures as ``Map.add_image`` takes them."""
-    others: list[MapModule]
+    others: list[ModuleCall]
     """Further modules of the map that the file lists."""
     agents: list[str]
     """The addresses of routers with agents."""
@@ -170,7 +162,7 @@ def check_modules(
     bridges: Mapping[str, "Bridge"],
     folder: Path,
     mistakes: Mistakes,
-) -> list[MapModule]:
+) -> list[ModuleCall]:
     """Return the modules of the map; note arguments that a module refuses.
 
     Args:
@@ -194,7 +186,7 @@ def check_modules(
         else:
             if name == "MapFile":
                 args, options = _map_file(module, folder, path, mistakes)
-            found.append(MapModule(name, args, options))
+            found.append((name, args, options))
     return found
 
 
@@ -246,8 +238,8 @@ def show_scenery(shown: console.Console, ready: ReadyFleet) -> None:
         shown.add_image(*image)
     for grid in ready.fleet.map:
         shown.add_grid(ready.bridges[grid.bridge], grid.topic, **grid.options)
-    for module in ready.others:
-        shown.add_module(module.name, *module.args, **module.options)
+    for name, args, others in ready.others:
+        shown.add_module(name, *args, **others)
 
 
 def restore(robots: "list[Robot]") -> None:
