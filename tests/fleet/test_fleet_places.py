@@ -98,6 +98,10 @@ def test_labels_are_read_from_the_fleet_file_or_from_a_separate_file(
             "fleet.toml:2: tiles.source: tiles 'https://tiles.example/{z}/{x}/{y}.png':"
             " tiles are read from this machine's disk alone",
         ),
+        (
+            TILES + "tile_size = 300\n",
+            "tiles.tile_size: got the whole number 300, expected 256 or 512",
+        ),
         (TILES.replace('"tiles"', '"no"'), "no such folder and no such file"),
     ],
 )

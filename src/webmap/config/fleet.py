@@ -66,6 +66,13 @@ class ImageConfig(Config, kw_only=True, frozen=True):
     height: Annotated[float, checks.above_zero("metres")]
 
 
+def _tile_size(value: Any) -> int:
+    size = checks.whole(256, 512)(value)
+    if size not in (256, 512):
+        raise ConfigError("256 or 512")
+    return int(size)
+
+
 class TilesConfig(Config, kw_only=True, frozen=True):
     """Tiles, and the place on the Earth where the map has its origin."""
 
@@ -74,7 +81,7 @@ class TilesConfig(Config, kw_only=True, frozen=True):
     longitude: Annotated[float, checks.between(-360, 360, "degrees")]
     east: Annotated[float, checks.between(-360, 360, "degrees")] | None = None
     attribution: Annotated[str, checks.text] | None = None
-    tile_size: Annotated[int, checks.whole(256, 512)] | None = None
+    tile_size: Annotated[int, checks.expecting("256 or 512", _tile_size)] | None = None
     most: Annotated[int, checks.whole(1, 256)] | None = None
     opacity: Annotated[float, checks.between(0, 1, "full opacity")] | None = None
 
