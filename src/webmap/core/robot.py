@@ -275,30 +275,46 @@ def _add(
     robot: VisibleRobot, layer: ModuleEntry, link: Link, mistakes: Mistakes
 ) -> None:
     path, module = layer
-    inner = path if path[0] == "modules" else None
     try:
         name, args, options = module_call(module, link)
         made = robot.add_module(name, *args, **options)
         if path[0] == "scan":
             robot.svg.insert(1, made.svg)  # after the title, under the body
-    except ModuleNotFound as error:
-        mistakes.add((*path, "name"), str(error))
-    except WrongArguments as error:
-        for wrong in error.wrong:
-            place = wrong.path if inner else ()
-            mistakes.add((*path, *place), wrong_argument(module, wrong))
     except WebMapError as error:
-        # The error of a module begins with the name of the argument.
-        key = str(error).partition(" ")[0].rstrip(":")
-        place = ("options", key) if inner and key in module.options else ()
-        text = f"{module.name}: {error}" if inner else str(error)
-        mistakes.add((*path, *place), text)
+        note_refused(mistakes, path, module, error)
     except Exception as error:  # a module from elsewhere may raise anything
         text = f"{type(error).__name__}: {error}"
         mistakes.add(path, f"{module.name} refused its arguments: {text}")
 
 
-def wrong_argument(module: ModuleConfig, wrong: WrongArgument) -> str:
+def note_refused(
+    mistakes: Mistakes, path: KeyPath, module: ModuleConfig, error: WebMapError
+) -> None:
+    """Add the error of a module that was not added.
+
+    Args:
+        mistakes: The list for every mistake.
+        path: The key that adds the module; only that of a whole module has keys inside.
+        module: The module.
+        error: The error.
+
+    """
+    is_whole = "modules" in path
+    if isinstance(error, ModuleNotFound):
+        mistakes.add((*path, "name"), str(error))
+    elif isinstance(error, WrongArguments):
+        for wrong in error.wrong:
+            place = wrong.path if is_whole else ()
+            mistakes.add((*path, *place), _wrong_argument(module, wrong))
+    else:
+        # The error of a module begins with the name of the argument.
+        key = str(error).partition(" ")[0].rstrip(":")
+        inside = ("options", key) if is_whole and key in module.options else ()
+        text = f"{module.name}: {error}" if is_whole else str(error)
+        mistakes.add((*path, *inside), text)
+
+
+def _wrong_argument(module: ModuleConfig, wrong: WrongArgument) -> str:
     """Return the error message for a wrong argument, with the expected value."""
     if not wrong.got:
         return f"{module.name}: {wrong.text}"

@@ -1,7 +1,6 @@
 """A fleet file: its bridges, robots, maps and modules are made, checked and shown."""
 
 import logging
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,10 +18,10 @@ from webmap.config.fleet import FleetConfig, ImageConfig, TilesConfig, read_flee
 from webmap.config.robot import MOTION, ModuleConfig, PictureConfig, RobotConfig
 from webmap.config.toml_text import read_text, readable_secret
 from webmap.core.alignment_store import store
-from webmap.core.module_arguments import WrongArguments, check_arguments
+from webmap.core.module_arguments import check_arguments
 from webmap.core.pictures import pictures
 from webmap.core.registry import map_modules
-from webmap.core.robot import ModuleCall, module_call, wrong_argument
+from webmap.core.robot import ModuleCall, module_call, note_refused
 from webmap.features.labels.label_store import label_file, read_labels
 from webmap.features.tiles.tile_source import open_tiles
 from webmap.fleet.remote_robots import find_agents
@@ -178,11 +177,8 @@ def check_modules(
         name, args, options = module_call(module, bridges.__getitem__)
         try:
             check_arguments(map_modules[name], args, options)
-        except WrongArguments as error:
-            for wrong in error.wrong:
-                mistakes.add((*path, *wrong.path), wrong_argument(module, wrong))
         except WebMapError as error:
-            mistakes.add((*path, "name"), str(error))
+            note_refused(mistakes, path, module, error)
         else:
             if name == "MapFile":
                 args, options = _map_file(module, folder, path, mistakes)
@@ -254,8 +250,6 @@ PICTURES = (".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".svg", ".tif", ".tiff")
 
 def check_floor(floor: Path, mistakes: Mistakes) -> None:
     """Note the mistakes of a floor plan."""
-    from webmap.console.floor import load_floor
-
     if floor.suffix.lower() in PICTURES:
         mistakes.add(
             ("floor",),
@@ -264,8 +258,7 @@ def check_floor(floor: Path, mistakes: Mistakes) -> None:
         )
         return
     try:
-        with tempfile.TemporaryDirectory() as folder:
-            load_floor(floor, Path(folder))
+        read_map(floor)
     except (ConfigError, OSError) as error:
         mistakes.add(("floor",), str(error))
 
