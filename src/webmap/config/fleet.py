@@ -180,7 +180,7 @@ def read_fleet(data: Mapping[str, Any], mistakes: Mistakes) -> FleetConfig:
 
 def _with_check(robot: RobotConfig, every: float) -> RobotConfig:
     """Return a robot that demands a check, unless it says itself how often."""
-    twist = robot.motion.twist
+    twist = robot.twist
     if twist is None or twist.check_every is not None:
         return robot
     checked = msgspec.structs.replace(twist, check_every=every)
@@ -245,7 +245,7 @@ def _no_base_twice(fleet: FleetConfig, mistakes: Mistakes) -> None:
     """Refuse two robots with one base: driving one would move the other."""
     first: dict[tuple[str, str], int] = {}
     for index, robot in enumerate(fleet.robots):
-        twist = robot.resolved().motion.twist
+        twist = robot.resolved().twist
         bridge = None if twist is None else fleet.bridges.get(twist.bridge)
         if twist is None or bridge is None or not twist.topic:
             continue

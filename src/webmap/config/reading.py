@@ -48,9 +48,6 @@ class Config(msgspec.Struct, frozen=True, omit_defaults=True):
     example: ClassVar[str] = ""
     """An example of the table, for error messages."""
 
-    inline: ClassVar[str] = ""
-    """A field that is itself a table, whose keys are written in this one."""
-
     @classmethod
     def expand(cls, value: Any) -> dict[str, Any] | None:
         """Return the table for its short form; None if the part is absent.
@@ -116,10 +113,6 @@ def _read_table(
     for key, each in known.items():
         if each.required and key not in table:
             mistakes.add(path, f'the key "{key}" is missing')
-    if cls.inline:
-        part = _inline(cls)
-        keys = values.keys() & set(part.__struct_fields__)
-        values[cls.inline] = part(**{key: values.pop(key) for key in keys})
     made = cls(**values)
     if mistakes.count == before:
         made.check(path, mistakes)
@@ -131,7 +124,7 @@ def read_key(cls: type[Config], key: str, value: Any, what: str) -> Any:
 
     Args:
         cls: The class of the table.
-        key: The key, also one of an inline table.
+        key: The key.
         value: The plain value, as in a fleet file.
         what: The configured thing, such as ``robot 'Bob'``.
 
@@ -168,19 +161,10 @@ class _Field:
 @functools.cache
 def _fields(cls: type[Config]) -> dict[str, _Field]:
     hints = get_type_hints(cls, include_extras=True)
-    found: dict[str, _Field] = {}
-    for each in msgspec.structs.fields(cls):
-        if each.name == cls.inline:
-            found |= _fields(_inline(cls))
-        else:
-            found[each.name] = _Field(_reader_of(hints[each.name]), each.required)
-    return found
-
-
-@functools.cache
-def _inline(cls: type[Config]) -> type[Config]:
-    part: type[Config] = get_type_hints(cls)[cls.inline]
-    return part
+    return {
+        each.name: _Field(_reader_of(hints[each.name]), each.required)
+        for each in msgspec.structs.fields(cls)
+    }
 
 
 def _reader_of(hint: Any) -> Reader:

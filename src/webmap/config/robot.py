@@ -5,7 +5,7 @@ use this form.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import msgspec
 
@@ -13,7 +13,14 @@ from webmap.base.errors import ConfigError
 from webmap.config import checks
 from webmap.config.buttons import ButtonConfig, check_labels
 from webmap.config.checks import KeyPath, Mistakes
-from webmap.config.motion import MotionConfig, TopicConfig
+from webmap.config.motion import (
+    InitialPoseConfig,
+    MotionConfig,
+    MoveConfig,
+    ScanAssistConfig,
+    TopicConfig,
+    TwistConfig,
+)
 from webmap.config.reading import ONE_OR_MORE, Config, read
 from webmap.ros.image_address import EXAMPLE, parse_address
 from webmap.ros.names import PICTURES, VIDEO, is_topic, is_type
@@ -192,12 +199,7 @@ def _css_class(value: Any) -> str:
 
 
 class RobotConfig(Config, kw_only=True, frozen=True):
-    """A robot; parts that it does not have are left out.
-
-    In plain data the parts of ``motion`` are keys of the robot itself.
-    """
-
-    inline: ClassVar[str] = "motion"
+    """A robot; parts that it does not have are left out."""
 
     name: Annotated[str, checks.any_text]
     """The displayed name."""
@@ -225,7 +227,10 @@ class RobotConfig(Config, kw_only=True, frozen=True):
     tags: Annotated[list[Annotated[str, checks.name]], ONE_OR_MORE] = []
     """Words by which the list of robots is grouped; the first one is the group."""
     cameras: Annotated[list[CameraConfig], ONE_OR_MORE] = []
-    motion: MotionConfig = MotionConfig()
+    twist: TwistConfig | None = None
+    move: MoveConfig | None = None
+    initial_pose: InitialPoseConfig | None = None
+    scan_assist: ScanAssistConfig | None = None
     buttons: list[ButtonConfig] = []
     modules: list[ModuleConfig] = []
     classes: list[Annotated[str, _css_class]] = []
@@ -266,10 +271,13 @@ class RobotConfig(Config, kw_only=True, frozen=True):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the configuration as plain data that fits JSON and TOML."""
-        data: dict[str, Any] = {}
-        for key, value in msgspec.to_builtins(self).items():
-            data |= value if key == "motion" else {key: value}
+        data: dict[str, Any] = msgspec.to_builtins(self)
         return data
+
+    @property
+    def motion(self) -> MotionConfig:
+        """The parts that move the robot."""
+        return MotionConfig(**{key: getattr(self, key) for key in MOTION})
 
     def check(self, path: KeyPath, mistakes: Mistakes) -> None:
         """Add mistakes that concern several fields."""
@@ -278,22 +286,15 @@ class RobotConfig(Config, kw_only=True, frozen=True):
             message = 'a robot has a "picture" or a "model"; remove one of them'
             mistakes.add((*path, "picture"), message)
 
-    def part(self, key: str) -> Any:
-        """Return a part by its key, including those of ``motion``; None if absent."""
-        return getattr(self.motion if key in MOTION else self, key)
-
     def with_part(self, key: str, part: Any) -> "RobotConfig":
-        """Return a copy with another part, of ``motion`` too; None removes the part."""
-        if key in MOTION:
-            motion = msgspec.structs.replace(self.motion, **{key: part})
-            return msgspec.structs.replace(self, motion=motion)
+        """Return a copy with another part; None removes the part."""
         return msgspec.structs.replace(self, **{key: part})
 
     def resolved(self) -> "RobotConfig":
         """Return the robot with a bridge in every part that uses one."""
         config = self
         for key in LINKED:
-            part = self.part(key)
+            part = getattr(self, key)
             if part is not None and not part.bridge:
                 linked = msgspec.structs.replace(part, bridge=self.bridge)
                 config = config.with_part(key, linked)
@@ -304,7 +305,7 @@ class RobotConfig(Config, kw_only=True, frozen=True):
         if self.bridge:
             yield ("bridge",), self.bridge
         for key in LINKED:
-            part = self.part(key)
+            part = getattr(self, key)
             if part is not None and part.bridge:
                 yield (key, "bridge"), part.bridge
         for index, module in enumerate(self.modules):

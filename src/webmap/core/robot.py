@@ -132,7 +132,7 @@ class Robot(VisibleRobot):
             alignment=None if own is None else numbers(own),
             battery_low=self.battery_low,
             tags=list(self.tags),
-            motion=self.motion.config,
+            **msgspec.structs.asdict(self.motion.config),
             modules=[
                 ModuleConfig(
                     name=name,
@@ -206,7 +206,8 @@ def apply_config(
     if _changes_bridge_of_goals(old.resolved(), new.resolved()):
         robot.configure("initial_pose", None)  # both must always use the same bridge
     for key in KEYS:
-        before, after = old.resolved().part(key), new.resolved().part(key)
+        before = getattr(old.resolved(), key)
+        after = getattr(new.resolved(), key)
         if before == after:
             continue
         try:
@@ -224,7 +225,7 @@ def apply_config(
 
 def _changes_bridge_of_goals(old: RobotConfig, new: RobotConfig) -> bool:
     """Return whether goals and the initial pose both change to another bridge."""
-    parts = [(config.motion.move, config.motion.initial_pose) for config in (old, new)]
+    parts = [(config.move, config.initial_pose) for config in (old, new)]
     bridges = [part.bridge for pair in parts for part in pair if part is not None]
     return len(bridges) == 4 and bridges[:2] != bridges[2:]
 

@@ -120,7 +120,10 @@ def moving_parts(config: RobotConfig) -> RobotConfig:
         base_link=base,
         odometry=config.odometry,
         alignment=config.alignment,
-        motion=config.motion,
+        twist=config.twist,
+        move=config.move,
+        initial_pose=config.initial_pose,
+        scan_assist=config.scan_assist,
     )
 
 

@@ -15,7 +15,7 @@ from webmap.base.local_plane import LocalPlane
 from webmap.base.map_file import read_map
 from webmap.config.checks import KeyPath, Mistakes, WrongConfig
 from webmap.config.fleet import FleetConfig, ImageConfig, TilesConfig, read_fleet
-from webmap.config.robot import MOTION, ModuleConfig, PictureConfig, RobotConfig
+from webmap.config.robot import ModuleConfig, PictureConfig, RobotConfig
 from webmap.config.toml_text import read_text, readable_secret
 from webmap.core.alignment_store import store
 from webmap.core.module_arguments import check_arguments
@@ -151,8 +151,8 @@ def _without(config: RobotConfig, wrong: list[KeyPath]) -> RobotConfig | None:
         key = str(path[2]) if len(path) > 2 else "name"
         if key in ("name", "bridge"):
             return None
-        if hasattr(plain, key) or key in MOTION:  # else there is no such key
-            config = config.with_part(key, plain.part(key))
+        if key in RobotConfig.__struct_fields__:  # else there is no such key
+            config = config.with_part(key, getattr(plain, key))
     return config
 
 
