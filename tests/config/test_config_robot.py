@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from webmap import Bridge, Robot, RobotConfig
 from webmap.base.errors import ConfigError
 from webmap.config.checks import Mistakes
-from webmap.config.motion import MotionConfig, TwistConfig
+from webmap.config.motion import TwistConfig
 from webmap.config.reading import read
 from webmap.config.robot import CameraConfig, ModuleConfig
 from webmap.core.robot import apply_config
@@ -203,9 +203,7 @@ def test_limits_accepted_by_the_configuration_are_accepted_by_the_gate(limits):
     twist = read(TwistConfig, {"topic": "/c", **limits}, (), mistakes)
     if mistakes.found:
         return
-    robot = Robot.from_config(
-        RobotConfig(name="Bob", bridge=URL, motion=MotionConfig(twist=twist))
-    )
+    robot = Robot.from_config(RobotConfig(name="Bob", bridge=URL, twist=twist))
     try:
         spec = checked(robot.motion.spec())
         assert {name: getattr(spec, name) for name in limits} == limits
@@ -229,7 +227,7 @@ def test_applying_a_configuration_changes_only_different_parts(bridges):
         scan=["/front"],
         battery="/battery",
         cameras=[CameraConfig(topic="/a", name="A")],
-        motion=MotionConfig(twist=TwistConfig(topic="/cmd_vel")),
+        twist=TwistConfig(topic="/cmd_vel"),
     )
     robot = Robot.from_config(old, bridges)
     try:

@@ -48,6 +48,28 @@ drive_without_proof = true
 topic = "/mo/video"
 type = "foxglove_msgs/CompressedVideo"
 
+[[robots.buttons]]
+label = "Horn"
+topic = "/mo/horn"
+type = "std_msgs/Bool"
+message = { data = true }
+form = true
+during_stop = true
+
+[[robots.buttons]]
+label = "Mode"
+service = "/mo/mode"
+type = "std_srvs/SetBool"
+args = { data = true }
+confirm = "Change the mode?"
+timeout = 3.0
+
+[[robots.buttons]]
+label = "Speed"
+parameter = "speed"
+node = "/mo/base"
+value = 0.5
+
 [robots.move]
 action = "/mo/m"
 action_type = "move_base_msgs/MoveBaseAction"

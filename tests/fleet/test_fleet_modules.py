@@ -58,7 +58,7 @@ def refused(tmp_path):
         (module("Trail", "step = nan", args=""), "options.step: Trail: step must be m"),
         (module("Range", "x = [1]"), "got the array [1], expected a number, for x of"),
         (module("Camera", 'throttle = "x"'), 'got the text "x", expected a whole num'),
-        (module("Camera", "throttle = -1"), "expected milliseconds, 0 or more, for"),
+        (module("Camera", "throttle = -1"), "of milliseconds, 0 or more, for"),
         (
             module("Path", args='"/plan"'),
             'FILE:9: robots[0].modules[0].args[0]: got the text "/plan", expected a '

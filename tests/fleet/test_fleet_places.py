@@ -74,11 +74,11 @@ def test_labels_are_read_from_the_fleet_file_or_from_a_separate_file(
         ('labels = "no.yaml"\n', "no.yaml: No such file or directory"),
         (
             '[[labels]]\nname = "A"\nx = 1\ny = "2"\n',
-            "fleet.toml:4: labels[0].y: expected a number of metres, got '2'",
+            'fleet.toml:4: labels[0].y: got the text "2", expected a number of metres',
         ),
         (
             '[[labels]]\nname = "A"\nx = 1\ny = 2\niocn = "pin"\n',
-            'fleet.toml:5: labels[0].iocn: no such key; did you mean "icon"?',
+            'fleet.toml:5: labels[0].iocn: there is no key "iocn" here; did you',
         ),
         (
             '[[labels]]\nname = "A"\nx = 1\n',
@@ -97,6 +97,10 @@ def test_labels_are_read_from_the_fleet_file_or_from_a_separate_file(
             TILES.replace('"tiles"', '"https://tiles.example/{z}/{x}/{y}.png"'),
             "fleet.toml:2: tiles.source: tiles 'https://tiles.example/{z}/{x}/{y}.png':"
             " tiles are read from this machine's disk alone",
+        ),
+        (
+            TILES + "tile_size = 300\n",
+            "tiles.tile_size: got the whole number 300, expected 256 or 512",
         ),
         (TILES.replace('"tiles"', '"no"'), "no such folder and no such file"),
     ],

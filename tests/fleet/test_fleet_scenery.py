@@ -78,9 +78,9 @@ def test_maps_images_and_map_modules_of_the_fleet_file_are_shown(ready, tmp_path
     assert (first, second) == ((north, "/map"), (south, "/map"))
     assert options[1] == {"palette": "costmap", "order": 12.0}
     assert console.images == [(str(tmp_path / "hall.png"), -2.0, 1.5, 40.0, 20.0)]
-    assert [module.name for module in ready.others] == ["Markers", "MapFile"]
-    assert ready.others[0].args == (south, "/zones")
-    assert ready.others[1].args == (str(tmp_path / "second.yaml"),)
+    assert [name for name, _, _ in ready.others] == ["Markers", "MapFile"]
+    assert ready.others[0][1] == (south, "/zones")
+    assert ready.others[1][1] == (str(tmp_path / "second.yaml"),)
 
 
 def test_open_pages_and_later_pages_get_all_maps_images_and_map_modules(ready):

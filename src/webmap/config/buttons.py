@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from typing import Annotated, Any, Literal, get_args
 
@@ -227,45 +227,39 @@ def read_buttons(buttons: Iterable[Any]) -> list[ButtonConfig]:
 
     """
     found = []
-    for number, (button, mistakes) in enumerate(_each_button(buttons)):
+    for number, each in enumerate(buttons):
+        mistakes = Mistakes()
+        button = read(ButtonConfig, each, (), mistakes)
         label = button and button.label
         mistakes.refuse(f"button {label!r}" if label else f"button number {number}")
         assert button is not None, "a table without a mistake is a button"
         found.append(button)
+    mistakes = Mistakes()
+    check_labels(found, ("buttons",), mistakes)
+    mistakes.refuse("")
     return found
 
 
-def check_buttons(buttons: Iterable[Any], path: KeyPath, mistakes: Mistakes) -> None:
-    """Add all mistakes in buttons.
+def check_labels(
+    buttons: Sequence[ButtonConfig], path: KeyPath, mistakes: Mistakes
+) -> None:
+    """Add a mistake for each button whose label another one has, and if they are many.
 
     Args:
-        buttons: A table for each button.
+        buttons: The buttons.
         path: The path of the list.
         mistakes: The list for every mistake.
 
     """
-    for index, (_, found) in enumerate(_each_button(buttons)):
-        mistakes.take((*path, index), found)
-
-
-def _each_button(
-    buttons: Iterable[Any],
-) -> Iterator[tuple[ButtonConfig | None, Mistakes]]:
-    """Yield each button with its mistakes; it is unusable if there are any."""
+    if len(buttons) > MAX_BUTTONS:
+        message = f"expected at most {MAX_BUTTONS} buttons, got more"
+        mistakes.add((*path, MAX_BUTTONS), message)
     labels: set[str] = set()
-    for number, each in enumerate(buttons):
-        mistakes = Mistakes()
-        if number == MAX_BUTTONS:
-            mistakes.add((), f"expected at most {MAX_BUTTONS} buttons, got more")
-            yield None, mistakes
-            return
-        button = read(ButtonConfig, each, (), mistakes)
-        if button is not None and button.label in labels:
+    for index, button in enumerate(buttons):
+        if button.label in labels:
             message = f'got "{button.label}", expected a label that no other button has'
-            mistakes.add(("label",), message)
-        elif button is not None and not mistakes.count:
-            labels.add(button.label)
-        yield button, mistakes
+            mistakes.add((*path, index, "label"), message)
+        labels.add(button.label)
 
 
 def motion_of(kind: ButtonKind, name: str, type: str | None) -> str | None:

@@ -292,21 +292,16 @@ def whole(low: int, high: int) -> Check:
     """Return a check for an integer within both limits; a boolean is none."""
 
     def check(value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, Integral):
-            raise ConfigError(f"a whole number from {low} to {high}")
-        if not low <= int(value) <= high:
+        number = isinstance(value, Integral) and not isinstance(value, bool)
+        if not number or not low <= int(value) <= high:
             raise ConfigError(f"a whole number from {low} to {high}")
         return int(value)
 
     return check
 
 
-def milliseconds(value: Any) -> int:
-    """Check a whole number of milliseconds."""
-    number = isinstance(value, Integral) and not isinstance(value, bool)
-    if not number or int(value) < 0:
-        raise ConfigError("a whole number of milliseconds, 0 or more")
-    return int(value)
+milliseconds = expecting("a whole number of milliseconds, 0 or more", whole(0, 2**63))
+"""Checks a whole number of milliseconds."""
 
 
 _UNITS = {"s": 1.0, "min": 60.0, "h": 3600.0}

@@ -49,6 +49,12 @@ class MapConfig(Config, kw_only=True, frozen=True):
     palette: Literal["map", "costmap", "raw"] | None = None
     order: Annotated[float, checks.finite("a number; robots have 100")] | None = None
 
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options of ``Console.add_grid`` that it has."""
+        options = {"palette": self.palette, "order": self.order}
+        return {key: value for key, value in options.items() if value is not None}
+
 
 class ImageConfig(Config, kw_only=True, frozen=True):
     """A picture under everything else."""
@@ -60,6 +66,13 @@ class ImageConfig(Config, kw_only=True, frozen=True):
     height: Annotated[float, checks.above_zero("metres")]
 
 
+def _tile_size(value: Any) -> int:
+    size = checks.whole(256, 512)(value)
+    if size not in (256, 512):
+        raise ConfigError("256 or 512")
+    return int(size)
+
+
 class TilesConfig(Config, kw_only=True, frozen=True):
     """Tiles, and the place on the Earth where the map has its origin."""
 
@@ -68,7 +81,7 @@ class TilesConfig(Config, kw_only=True, frozen=True):
     longitude: Annotated[float, checks.between(-360, 360, "degrees")]
     east: Annotated[float, checks.between(-360, 360, "degrees")] | None = None
     attribution: Annotated[str, checks.text] | None = None
-    tile_size: Annotated[int, checks.whole(256, 512)] | None = None
+    tile_size: Annotated[int, checks.expecting("256 or 512", _tile_size)] | None = None
     most: Annotated[int, checks.whole(1, 256)] | None = None
     opacity: Annotated[float, checks.between(0, 1, "full opacity")] | None = None
 
@@ -167,7 +180,7 @@ def read_fleet(data: Mapping[str, Any], mistakes: Mistakes) -> FleetConfig:
 
 def _with_check(robot: RobotConfig, every: float) -> RobotConfig:
     """Return a robot that demands a check, unless it says itself how often."""
-    twist = robot.motion.twist
+    twist = robot.twist
     if twist is None or twist.check_every is not None:
         return robot
     checked = msgspec.structs.replace(twist, check_every=every)
@@ -232,7 +245,7 @@ def _no_base_twice(fleet: FleetConfig, mistakes: Mistakes) -> None:
     """Refuse two robots with one base: driving one would move the other."""
     first: dict[tuple[str, str], int] = {}
     for index, robot in enumerate(fleet.robots):
-        twist = robot.resolved().motion.twist
+        twist = robot.resolved().twist
         bridge = None if twist is None else fleet.bridges.get(twist.bridge)
         if twist is None or bridge is None or not twist.topic:
             continue

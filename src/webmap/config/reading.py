@@ -48,9 +48,6 @@ class Config(msgspec.Struct, frozen=True, omit_defaults=True):
     example: ClassVar[str] = ""
     """An example of the table, for error messages."""
 
-    inline: ClassVar[str] = ""
-    """A field that is itself a table, whose keys are written in this one."""
-
     @classmethod
     def expand(cls, value: Any) -> dict[str, Any] | None:
         """Return the table for its short form; None if the part is absent.
@@ -116,57 +113,29 @@ def _read_table(
     for key, each in known.items():
         if each.required and key not in table:
             mistakes.add(path, f'the key "{key}" is missing')
-    if cls.inline:
-        part = _inline(cls)
-        keys = values.keys() & set(part.__struct_fields__)
-        values[cls.inline] = part(**{key: values.pop(key) for key in keys})
     made = cls(**values)
     if mistakes.count == before:
         made.check(path, mistakes)
     return made
 
 
-def read_part(
-    cls: type[S], key: str, values: Mapping[str, Any], what: str, bridge: str = ""
-) -> S:
-    """Return one part of a configuration from the arguments of a method.
+def read_key(cls: type[Config], key: str, value: Any, what: str) -> Any:
+    """Return the value of one key of a table, from the arguments of a method.
 
     Args:
-        cls: The class of the part.
-        key: The key of the part in the whole.
-        values: The arguments. An empty value counts as left out where that is the
-            default.
+        cls: The class of the table.
+        key: The key.
+        value: The plain value, as in a fleet file.
         what: The configured thing, such as ``robot 'Bob'``.
-        bridge: The URL of its bridge.
 
     Raises:
         ConfigError: If a value is wrong; the message lists every mistake.
 
     """
-    empty = _empty(cls)
-    given = {k: v for k, v in values.items() if not (k in empty and v == "")}
-    if bridge:
-        given["bridge"] = bridge
     mistakes = Mistakes()
-    part = read(cls, given, (key,), mistakes)
+    made = _fields(cls)[key].read(value, (key,), mistakes)
     mistakes.refuse(what)
-    assert part is not None, "a table without a mistake is a part"
-    return part
-
-
-def tables_of(cls: type[Config], *keys: str) -> dict[str, type[Config]]:
-    """Return the classes of the fields that are tables, by the names of the fields.
-
-    Args:
-        cls: The class.
-        keys: The fields; all of the class if left out, which must be tables.
-
-    """
-    hints = get_type_hints(cls)
-    return {
-        key: next(each for each in get_args(hints[key]) if each is not types.NoneType)
-        for key in keys or cls.__struct_fields__
-    }
+    return made
 
 
 def unknown(
@@ -192,26 +161,10 @@ class _Field:
 @functools.cache
 def _fields(cls: type[Config]) -> dict[str, _Field]:
     hints = get_type_hints(cls, include_extras=True)
-    found: dict[str, _Field] = {}
-    for each in msgspec.structs.fields(cls):
-        if each.name == cls.inline:
-            found |= _fields(_inline(cls))
-        else:
-            found[each.name] = _Field(_reader_of(hints[each.name]), each.required)
-    return found
-
-
-@functools.cache
-def _empty(cls: type[Config]) -> frozenset[str]:
-    """Return the names of the fields that are empty by default."""
-    fields = msgspec.structs.fields(cls)
-    return frozenset(each.name for each in fields if each.default == "")
-
-
-@functools.cache
-def _inline(cls: type[Config]) -> type[Config]:
-    part: type[Config] = get_type_hints(cls)[cls.inline]
-    return part
+    return {
+        each.name: _Field(_reader_of(hints[each.name]), each.required)
+        for each in msgspec.structs.fields(cls)
+    }
 
 
 def _reader_of(hint: Any) -> Reader:

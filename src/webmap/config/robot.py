@@ -5,16 +5,23 @@ use this form.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.config import checks
-from webmap.config.buttons import check_buttons
+from webmap.config.buttons import ButtonConfig, check_labels
 from webmap.config.checks import KeyPath, Mistakes
-from webmap.config.motion import MotionConfig, TopicConfig
-from webmap.config.reading import ONE_OR_MORE, Config, ReadBy, read, tables_of
+from webmap.config.motion import (
+    InitialPoseConfig,
+    MotionConfig,
+    MoveConfig,
+    ScanAssistConfig,
+    TopicConfig,
+    TwistConfig,
+)
+from webmap.config.reading import ONE_OR_MORE, Config, read
 from webmap.ros.image_address import EXAMPLE, parse_address
 from webmap.ros.names import PICTURES, VIDEO, is_topic, is_type
 
@@ -29,6 +36,9 @@ ODOMETRY_TYPES = (
 
 MOTION = tuple(MotionConfig.__struct_fields__)
 """Keys of a robot's table that are parts of its motion."""
+
+LINKED = ("odometry", "tf", "twist", "move", "initial_pose")
+"""Keys of the parts that use a bridge."""
 
 
 class OdometryConfig(TopicConfig, kw_only=True, frozen=True):
@@ -172,21 +182,6 @@ Alignment = Annotated[
 counter-clockwise."""
 
 
-def _any_table(value: Any) -> dict[str, Any]:
-    if not isinstance(value, Mapping):
-        raise ConfigError("a table of keys and values")
-    return dict(value)
-
-
-def _buttons(value: Any, path: KeyPath, mistakes: Mistakes) -> list[dict[str, Any]]:
-    if not isinstance(value, list | tuple):
-        message = "expected a table [[robots.buttons]] for each"
-        mistakes.add(path, f"got {checks.show(value)}, {message}")
-        return []
-    check_buttons(value, path, mistakes)
-    return [dict(each) for each in value if isinstance(each, Mapping)]
-
-
 OWN_CLASSES = ("robot", "unplaced", "selected", "stale")
 """CSS classes that WebMap itself gives to a robot."""
 
@@ -204,12 +199,7 @@ def _css_class(value: Any) -> str:
 
 
 class RobotConfig(Config, kw_only=True, frozen=True):
-    """A robot; parts that it does not have are left out.
-
-    In plain data the parts of ``motion`` are keys of the robot itself.
-    """
-
-    inline: ClassVar[str] = "motion"
+    """A robot; parts that it does not have are left out."""
 
     name: Annotated[str, checks.any_text]
     """The displayed name."""
@@ -237,13 +227,21 @@ class RobotConfig(Config, kw_only=True, frozen=True):
     tags: Annotated[list[Annotated[str, checks.name]], ONE_OR_MORE] = []
     """Words by which the list of robots is grouped; the first one is the group."""
     cameras: Annotated[list[CameraConfig], ONE_OR_MORE] = []
-    motion: MotionConfig = MotionConfig()
-    buttons: Annotated[list[dict[str, Any]], ReadBy(_buttons)] = []
-    """The arguments of the module ``Buttons``."""
+    twist: TwistConfig | None = None
+    move: MoveConfig | None = None
+    initial_pose: InitialPoseConfig | None = None
+    scan_assist: ScanAssistConfig | None = None
+    buttons: list[ButtonConfig] = []
     modules: list[ModuleConfig] = []
     classes: list[Annotated[str, _css_class]] = []
     """CSS classes."""
-    model: Annotated[dict[str, Any], _any_table] | None = None
+    model: (
+        Annotated[
+            dict[str, Any],
+            checks.expecting("a table of keys and values", checks.table),
+        ]
+        | None
+    ) = None
     """The drawing: an element as plain data."""
 
     @classmethod
@@ -273,33 +271,30 @@ class RobotConfig(Config, kw_only=True, frozen=True):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the configuration as plain data that fits JSON and TOML."""
-        data: dict[str, Any] = {}
-        for key, value in msgspec.to_builtins(self).items():
-            data |= value if key == "motion" else {key: value}
+        data: dict[str, Any] = msgspec.to_builtins(self)
         return data
+
+    @property
+    def motion(self) -> MotionConfig:
+        """The parts that move the robot."""
+        return MotionConfig(**{key: getattr(self, key) for key in MOTION})
 
     def check(self, path: KeyPath, mistakes: Mistakes) -> None:
         """Add mistakes that concern several fields."""
+        check_labels(self.buttons, (*path, "buttons"), mistakes)
         if self.picture is not None and self.model is not None:
             message = 'a robot has a "picture" or a "model"; remove one of them'
             mistakes.add((*path, "picture"), message)
 
-    def part(self, key: str) -> Any:
-        """Return a part by its key, including those of ``motion``; None if absent."""
-        return getattr(self.motion if key in MOTION else self, key)
-
     def with_part(self, key: str, part: Any) -> "RobotConfig":
-        """Return a copy with another part, of ``motion`` too; None removes the part."""
-        if key in MOTION:
-            motion = msgspec.structs.replace(self.motion, **{key: part})
-            return msgspec.structs.replace(self, motion=motion)
+        """Return a copy with another part; None removes the part."""
         return msgspec.structs.replace(self, **{key: part})
 
     def resolved(self) -> "RobotConfig":
         """Return the robot with a bridge in every part that uses one."""
         config = self
         for key in LINKED:
-            part = self.part(key)
+            part = getattr(self, key)
             if part is not None and not part.bridge:
                 linked = msgspec.structs.replace(part, bridge=self.bridge)
                 config = config.with_part(key, linked)
@@ -310,7 +305,7 @@ class RobotConfig(Config, kw_only=True, frozen=True):
         if self.bridge:
             yield ("bridge",), self.bridge
         for key in LINKED:
-            part = self.part(key)
+            part = getattr(self, key)
             if part is not None and part.bridge:
                 yield (key, "bridge"), part.bridge
         for index, module in enumerate(self.modules):
@@ -333,7 +328,8 @@ class RobotConfig(Config, kw_only=True, frozen=True):
             battery = ModuleConfig(name="Battery", args=[link, self.battery])
             layers.append(ModuleEntry(("battery",), battery))
         if self.buttons:
-            buttons = ModuleConfig(name="Buttons", args=[link, self.buttons])
+            each = msgspec.to_builtins(self.buttons)
+            buttons = ModuleConfig(name="Buttons", args=[link, each])
             layers.append(ModuleEntry(("buttons",), buttons))
         for index, camera in enumerate(named_cameras(self.cameras)):
             throttle = camera.throttle
@@ -350,13 +346,6 @@ class RobotConfig(Config, kw_only=True, frozen=True):
         return layers + [
             ModuleEntry(("modules", index), module) for index, module in listed
         ]
-
-
-PARTS = tables_of(RobotConfig, "odometry", "tf") | tables_of(MotionConfig)
-"""The parts of a robot that are no modules, by their keys."""
-
-LINKED = tuple(key for key, part in PARTS.items() if "bridge" in part.__struct_fields__)
-"""Parts that use a bridge."""
 
 
 def read_robot(value: Any, path: KeyPath, mistakes: Mistakes) -> RobotConfig | None:

@@ -35,7 +35,8 @@ _STRING = (  # up to two quotes before the three that end a text belong to it
 )
 _TOKEN = re.compile(
     rf"(?P<part>{_STRING}|[A-Za-z0-9_-]+)|(?P<dot>[ \t]*\.[ \t]*)"
-    r"|(?P<opens>[\[{])|(?P<closes>[\]}])|(?P<quote>[\"'])|(?:#[^\n]*|[^\w\"'.\[\]{}#])",
+    r"|(?P<opens>[\[{])|(?P<closes>[\]}])|(?P<sign>[=,\n])|(?P<quote>[\"'])"
+    r"|#[^\n]*|[^\w\"'.\[\]{}#=,\n]+",
     re.DOTALL,
 )
 
@@ -60,12 +61,6 @@ MESSAGES = {
     "line after a value",
 }
 """The errors of the TOML reader, reworded for authors of files."""
-
-_BARE = re.compile(r"[A-Za-z0-9_-]+")
-_SPACE = re.compile(r"[ \t]*")
-_GAP = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
-_PLAIN = re.compile(r"[^,\]}#\n]*")
-_TEXT = re.compile(_STRING, re.DOTALL)
 
 
 class FleetText:
@@ -152,12 +147,11 @@ class Lines:
     """
 
     def __init__(self, text: str) -> None:
-        self._text = text.replace("\r\n", "\n")
-        self._at = 0
         self._found: dict[KeyPath, int] = {}
         self._tables: dict[KeyPath, int] = {}
-        self._seen_to = (0, 1)
-        self._document()
+        """The index of the newest table of each array of tables."""
+        self._line = 1
+        self._read(text)
 
     def of(self, path: KeyPath) -> int:
         """Return the line of a path, or of its nearest parent; 1 for the file."""
@@ -165,108 +159,64 @@ class Lines:
             path = path[:-1]
         return self._found.get(path, 1)
 
-    def _document(self) -> None:
+    def _read(self, text: str) -> None:
         table: KeyPath = ()
-        while self._skip(_GAP) < len(self._text):
-            if self._next("[["):
-                table = self._header(array=True)
-            elif self._next("["):
-                table = self._header(array=False)
-            else:
-                self._pair(table)
+        # Each array and inline table that is open: its path, and in an array the index.
+        open_values: list[tuple[KeyPath, int | None]] = []
+        value: KeyPath | None = None  # the path of the value here; None among keys
+        keys: list[str] = []
+        brackets = 0  # of a header that is open
+        for token in _TOKEN.finditer(text):
+            if value is not None and token.lastgroup in ("part", "opens"):
+                self._found.setdefault(value, self._line)
+            match token.lastgroup, token[0]:
+                case "part", _ if value is None:
+                    keys.append(_unquoted(token[0]))
+                case "sign", "=":
+                    value = open_values[-1][0] if open_values else table
+                    for key in keys:
+                        value = (*value, key)
+                        self._found.setdefault(value, self._line)
+                    keys = []
+                case "opens", "[" if value is None:
+                    brackets += 1
+                case "closes", "]" if brackets:
+                    table, keys = self._header(keys, array=brackets == 2), []
+                    brackets = 0
+                case "opens", "[" if value is not None:
+                    open_values.append((value, 0))
+                    value = (*value, 0)
+                case "opens", "{":
+                    open_values.append((value or (), None))
+                    value = None
+                case "closes", _ if open_values:
+                    value, _ = open_values.pop()
+                case "sign", ",":
+                    path, index = open_values.pop()
+                    index = None if index is None else index + 1
+                    value = None if index is None else (*path, index)
+                    open_values.append((path, index))
+                case "sign", "\n" if not open_values:
+                    value = None
+            self._line += token[0].count("\n")
 
-    def _header(self, *, array: bool) -> KeyPath:
-        keys = self._key()
-        self._at += 2 if array else 1
+    def _header(self, keys: list[str], *, array: bool) -> KeyPath:
         path: KeyPath = ()
         for place, key in enumerate(keys):
             path = (*path, key)
             if array and place == len(keys) - 1:
                 self._tables[path] = self._tables.get(path, -1) + 1
-            self._note(path)
+            self._found.setdefault(path, self._line)
             if path in self._tables:
                 path = (*path, self._tables[path])
-        self._found[path] = self._line()
+        self._found[path] = self._line
         return path
-
-    def _pair(self, table: KeyPath) -> None:
-        path = table
-        start = self._line()
-        for key in self._key():
-            path = (*path, key)
-            self._found.setdefault(path, start)
-        self._at += 1  # the equals sign
-        self._value(path)
-
-    def _value(self, path: KeyPath) -> None:
-        self._skip(_GAP)
-        if self._next("["):
-            self._array(path)
-        elif self._next("{"):
-            self._inline(path)
-        else:
-            string = _TEXT.match(self._text, self._at)
-            self._at = string.end() if string else self._skip(_PLAIN)
-
-    def _array(self, path: KeyPath) -> None:
-        index = 0
-        while self._skip(_GAP) < len(self._text) and not self._next("]"):
-            self._note((*path, index))
-            self._value((*path, index))
-            self._skip(_GAP)
-            self._next(",")
-            index += 1
-
-    def _inline(self, path: KeyPath) -> None:
-        while self._skip(_GAP) < len(self._text) and not self._next("}"):
-            self._pair(path)
-            self._skip(_GAP)
-            self._next(",")
-
-    def _key(self) -> list[str]:
-        keys = []
-        while True:
-            self._skip(_SPACE)
-            string = _TEXT.match(self._text, self._at)
-            bare = _BARE.match(self._text, self._at)
-            if string is not None:
-                keys.append(_unquoted(string[0]))
-                self._at = string.end()
-            elif bare is not None:
-                keys.append(bare[0])
-                self._at = bare.end()
-            else:
-                raise ValueError(f"no key on line {self._line()}")
-            self._skip(_SPACE)
-            if not self._next("."):
-                return keys
-
-    def _skip(self, pattern: re.Pattern[str]) -> int:
-        found = pattern.match(self._text, self._at)
-        assert found is not None, "every one of these patterns matches nothing too"
-        self._at = found.end()
-        return self._at
-
-    def _next(self, text: str) -> bool:
-        if self._text.startswith(text, self._at):
-            self._at += len(text)
-            return True
-        return False
-
-    def _note(self, path: KeyPath) -> None:
-        self._found.setdefault(path, self._line())
-
-    def _line(self) -> int:
-        at, line = self._seen_to
-        line += self._text.count("\n", at, self._at)
-        self._seen_to = (self._at, line)
-        return line
 
 
 def _unquoted(key: str) -> str:
-    if "\\" in key:
+    if key.startswith('"') and "\\" in key:
         return str(tomllib.loads(f"key = {key}")["key"])
-    return key[1:-1]  # keys are on one line, with one quote on each side
+    return key[1:-1] if key[0] in "\"'" else key
 
 
 def too_deep(text: str) -> int | None:

@@ -26,14 +26,21 @@ from typing import (
 )
 
 from webmap.base.errors import ConfigError
+from webmap.config import checks
 from webmap.config.checks import KeyPath, did_you_mean
-from webmap.ros.names import normalise_topic
 
 Mismatch: TypeAlias = tuple[KeyPath, Any, str]
 """The path of a value of the wrong type, the value, and the expected type."""
 
 _PLAIN = (str, bytes, int, float, list, tuple, dict, type(None))
 """Types that files consist of; only values of these types are checked."""
+
+MEANINGS = {("topic", str): checks.topic, ("throttle", int): checks.milliseconds}
+"""The checks of parameters that mean the same in every module, by name and type.
+
+A bad topic would otherwise be found only on subscription, which may be when the first
+page opens.
+"""
 
 _NAMES = {
     bool: "true or false",
@@ -320,16 +327,11 @@ def _one(
         many = parameter.kind is inspect.Parameter.VAR_KEYWORD
         name = str(path[1]) if many else parameter.name
         yield WrongArgument((*path, *deeper), expected, name, (got,))
-    elif parameter.name == "topic" and isinstance(value, str):
-        # The parameter means the same in every module. A bad name would otherwise be
-        # found only on subscription, which may be when the first page opens.
+    elif (parameter.name, type(value)) in MEANINGS:
         try:
-            normalise_topic(value)
-        except ConfigError:
-            expected = 'the name of a topic, such as "/odom"'
-            yield WrongArgument(path, expected, "topic", (value,))
-    elif parameter.name == "throttle" and isinstance(value, int) and value < 0:
-        yield WrongArgument(path, "milliseconds, 0 or more", "throttle", (value,))
+            MEANINGS[parameter.name, type(value)](value)
+        except ConfigError as error:
+            yield WrongArgument(path, str(error), parameter.name, (value,))
 
 
 def _after_owner(signature: inspect.Signature) -> list[inspect.Parameter]:

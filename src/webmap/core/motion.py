@@ -8,6 +8,7 @@ from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import msgspec
+from msgspec import structs
 
 from webmap.base.errors import ConfigError, MotionError
 from webmap.base.geometry import Pose
@@ -44,12 +45,6 @@ ASK_WRITERS = 10.0
 
 WRITING = ("twist", "move", "initial_pose")
 """The parts that the gate writes for; the first one of a robot sets its bridge."""
-
-OF_BASE = sorted(
-    set(TwistConfig.__struct_fields__)
-    & set(RobotSpec.__struct_fields__) - {"stop_hooks"}
-)
-"""The fields of a base that configuration and gate share."""
 
 PartBridges: TypeAlias = dict[str, Bridge | None]
 """The bridge of each part."""
@@ -272,24 +267,16 @@ class RobotMotion:
             return None
         driven: dict[str, Any] = {}
         if twist is not None:
-            driven = {name: getattr(twist, name) for name in OF_BASE}
-            driven["stop_hooks"] = tuple(
-                StopHook(topic=hook.topic, service=hook.service, type=hook.type)
-                for hook in twist.stop_hooks
-            )
-            driven["twist_topic"] = twist.topic
+            hooks = (StopHook(**structs.asdict(hook)) for hook in twist.stop_hooks)
+            driven = _same_fields(twist, RobotSpec)
+            driven |= {"twist_topic": twist.topic, "stop_hooks": tuple(hooks)}
             if config.scan_assist is not None:
                 driven["assist"] = _assist(config.scan_assist)
         goals: dict[str, Any] = {}
         if move is not None:
-            goals = {
-                "goal_topic": move.topic or None,
-                "goal_type": _goal_type(move, "PoseStamped"),
-                "cancel_topic": move.cancel_topic,
-                "action": move.action,
-                "action_type": move.action_type,
-                "on_operator_loss": move.on_operator_loss,
-            }
+            goals = _same_fields(move, RobotSpec)
+            goals["goal_topic"] = move.topic or None
+            goals["goal_type"] = _goal_type(move, "PoseStamped")
         if pose is not None:
             goals["pose_topic"] = pose.topic
             goals["pose_covariance"] = pose.covariance
@@ -411,19 +398,16 @@ def _goal_type(move: MoveConfig | None, name: str) -> str:
     return f"geometry_msgs/msg/{name}" if ros2 else f"geometry_msgs/{name}"
 
 
+def _same_fields(part: Config, spec: type[msgspec.Struct]) -> dict[str, Any]:
+    """Return the fields of a part that the gate has under the same names."""
+    names = set(part.__struct_fields__) & set(spec.__struct_fields__)
+    return {name: getattr(part, name) for name in names}
+
+
 def _assist(config: ScanAssistConfig) -> AssistSpec:
     """Return the gate's form of scan assist: a radius becomes corners."""
-    return AssistSpec(
-        topic=config.topic,
-        footprint=config.corners,
-        sensor=config.sensor,
-        upside_down=config.upside_down,
-        frame=config.frame,
-        stop_distance=config.stop_distance,
-        brake=config.brake,
-        blind=config.blind,
-        creep=config.creep,
-    )
+    same = _same_fields(config, AssistSpec)
+    return AssistSpec(**{**same, "footprint": config.corners}, sensor=config.sensor)
 
 
 robot_motions: set[RobotMotion] = set()

@@ -18,9 +18,9 @@ from typing import (
 from webmap.base.errors import ConfigError, MotionError
 from webmap.base.geometry import Orientation, Position, Quaternion, Twist
 from webmap.base.scope import no_scope
-from webmap.config.motion import COVARIANCE, NAVIGATE_TO_POSE, MotionConfig
-from webmap.config.reading import Config, read_part, tables_of
-from webmap.config.robot import LINKED
+from webmap.config.motion import COVARIANCE, NAVIGATE_TO_POSE
+from webmap.config.reading import read_key
+from webmap.config.robot import LINKED, MOTION, RobotConfig
 from webmap.core.extendable import Extendable
 from webmap.core.module_arguments import WrongArguments, check_arguments
 from webmap.core.motion import RobotMotion
@@ -53,6 +53,8 @@ def sets_part(key: str) -> Callable[[Method[D, P]], Method[D, P]]:
         signature = inspect.signature(method)
         # The check asks for it again for each robot.
         setattr(method, "__signature__", signature)  # noqa: B010
+        _, *parameters = signature.parameters.values()
+        defaults = {p.name: p.default for p in parameters if p.default is not p.empty}
 
         @functools.wraps(method)
         def setter(owner: D, /, *args: P.args, **kwargs: P.kwargs) -> None:
@@ -64,9 +66,11 @@ def sets_part(key: str) -> Callable[[Method[D, P]], Method[D, P]]:
                     called = f"robot {owner.name!r}: {method.__name__}"
                     raise WrongArguments(called, wrong) from None
             given = signature.bind(owner, *args, **kwargs)
-            given.apply_defaults()
             _, *values = given.arguments.items()
-            part = dict(values)
+            part = {**defaults, **dict(values)}
+            for name, default in defaults.items():
+                if default == "" and part[name] == "":  # it counts as left out
+                    del part[name]
             bridge = part.pop("bridge", None)
             owner.configure(key, part, bridge)
 
@@ -87,8 +91,8 @@ class MovableRobot(Extendable):
 
     """
 
-    _parts: ClassVar[Mapping[str, type[Config]]] = tables_of(MotionConfig)
-    """The parts of its configuration that :meth:`configure` sets, by their keys."""
+    _keys: ClassVar[tuple[str, ...]] = MOTION
+    """The keys of its configuration that :meth:`configure` sets."""
 
     def __init__(self, name: str, namespace: Namespace) -> None:
         super().__init__(namespace)
@@ -178,33 +182,31 @@ class MovableRobot(Extendable):
     def configure(
         self,
         key: str,
-        values: Mapping[str, Any] | None,
+        value: Any,
         bridge: Bridge | None = None,
     ) -> None:
-        """Set or clear one part of the robot's configuration.
+        """Set or clear one key of the robot's configuration.
 
         Args:
-            key: The part's name in a fleet file, such as ``"twist"``.
-            values: The part's values, as in a fleet file; None clears the part.
-            bridge: The bridge of the part, if it has one of its own.
+            key: The key in a fleet file, such as ``"twist"``.
+            value: The value, as in a fleet file; None clears the key.
+            bridge: The bridge of a part that has one of its own.
 
         Raises:
             ConfigError: If a value is not valid; the message lists every mistake.
 
         """
         what = f"robot {self.name!r}"
-        if key not in self._parts:
-            keys = ", ".join(self._parts)
+        if key not in self._keys:
+            keys = ", ".join(self._keys)
             raise ConfigError(f'{what}: there is no key "{key}" here; there are {keys}')
-        part = None
-        if values is not None:
-            if key in LINKED and bridge is None:
+        if key in LINKED and value is not None:
+            if bridge is None:
                 raise ConfigError(f"{what}: {key}: a bridge is missing")
-            url = "" if bridge is None else bridge.url
-            part = read_part(self._parts[key], key, values, what, url)
-        self._set_part(key, part, bridge)
+            value = {**value, "bridge": bridge.url}
+        self._set(key, read_key(RobotConfig, key, value, what), bridge)
 
-    def _set_part(self, key: str, part: Config | None, bridge: Bridge | None) -> None:
+    def _set(self, key: str, part: Any, bridge: Bridge | None) -> None:
         with no_scope():
             self.motion.set(key, part, bridge)
 

@@ -10,7 +10,6 @@ from webmap.config import checks
 from webmap.config.checks import KeyPath, Mistakes
 from webmap.config.robot import (
     LINKED,
-    MOTION,
     OWN_CLASSES,
     ModuleConfig,
     ModuleEntry,
@@ -21,11 +20,10 @@ from webmap.config.robot import (
 )
 from webmap.core.module_arguments import WrongArgument, WrongArguments
 from webmap.core.robot_model import element_from_dict, element_to_dict
-from webmap.core.visible_robot import VisibleRobot
+from webmap.core.visible_robot import KEYS, VisibleRobot
 from webmap.poses.alignment import numbers
 from webmap.poses.frames import frames_of
 from webmap.ros.bridge import Bridge
-from webmap.ros.tf import Buffer
 from webmap.scene.element import Element
 
 NONE = {"none": True}
@@ -134,7 +132,7 @@ class Robot(VisibleRobot):
             alignment=None if own is None else numbers(own),
             battery_low=self.battery_low,
             tags=list(self.tags),
-            motion=self.motion.config,
+            **msgspec.structs.asdict(self.motion.config),
             modules=[
                 ModuleConfig(
                     name=name,
@@ -205,18 +203,20 @@ def apply_config(
         robot.motion.declare()
         if new.tf is not None:  # it may name no other base
             old = old.with_part("tf", None)
-    if old.tags != new.tags:
-        robot.set_tags(new.tags)
-    if old.battery_low != new.battery_low:
-        robot.set_battery_low(new.battery_low)
     if _changes_bridge_of_goals(old.resolved(), new.resolved()):
         robot.configure("initial_pose", None)  # both must always use the same bridge
-    for key in ("odometry", "tf", "alignment", *MOTION):
-        before, after = old.resolved().part(key), new.resolved().part(key)
+    for key in KEYS:
+        before = getattr(old.resolved(), key)
+        after = getattr(new.resolved(), key)
         if before == after:
             continue
         try:
-            _set(robot, key, after, link)
+            linked = key in LINKED and after is not None
+            bridge = link(after.bridge) if linked else None
+            if isinstance(after, TfConfig) and bridge is not None:
+                _place(robot, after, bridge)
+            else:
+                robot.configure(key, msgspec.to_builtins(after), bridge)
         except WebMapError as error:
             _note(mistakes, (key,), error, robot.name)
     _set_layers(robot, old, new, link, mistakes)
@@ -225,35 +225,17 @@ def apply_config(
 
 def _changes_bridge_of_goals(old: RobotConfig, new: RobotConfig) -> bool:
     """Return whether goals and the initial pose both change to another bridge."""
-    parts = [(config.motion.move, config.motion.initial_pose) for config in (old, new)]
+    parts = [(config.move, config.initial_pose) for config in (old, new)]
     bridges = [part.bridge for pair in parts for part in pair if part is not None]
     return len(bridges) == 4 and bridges[:2] != bridges[2:]
 
 
-def _set(robot: VisibleRobot, key: str, part: Any, link: Link) -> None:
-    """Set or clear a part that is not a module."""
-    if key == "alignment":
-        robot.unset_alignment() if part is None else robot.set_alignment(*part)
-    elif part is None:
-        robot.configure(key, None)
-    elif key == "tf":
-        _place(robot, part, link(part.bridge))
-    else:
-        values = msgspec.to_builtins(part)
-        over = values.pop("bridge", None)
-        robot.configure(key, values, link(over or "") if key in LINKED else None)
-
-
 def _place(robot: VisibleRobot, tf: TfConfig, bridge: Bridge) -> None:
     """Place a robot by TF, and move the layers of its map into the same frame."""
-    before = robot.tf
-    options = {**msgspec.structs.asdict(tf), "bridge": bridge}
-    if before == {**options, **_names(robot, tf)}:
-        return
     # Keep the received frames until the new subscription is made.
     held = frames_of(bridge, tf.namespace).join(lambda: None)
     try:
-        robot.set_tf(**options)
+        robot.configure("tf", msgspec.to_builtins(tf), bridge)
     finally:
         held.remove()
     frame = (robot.tf or {})["map_frame"]
@@ -263,13 +245,6 @@ def _place(robot: VisibleRobot, tf: TfConfig, bridge: Bridge) -> None:
             name, args, options = made
             robot.remove_module(module)
             robot.add_module(name, *args, **{**options, "map_frame": frame})
-
-
-def _names(robot: VisibleRobot, tf: TfConfig) -> dict[str, str]:
-    """Return the full names of the frames that would place a robot."""
-    base, name = tf.base_frame or robot.base_link, Buffer().name
-    space = tf.namespace
-    return {"map_frame": name(tf.map_frame, space), "base_frame": name(base, space)}
 
 
 def _set_layers(
@@ -301,30 +276,46 @@ def _add(
     robot: VisibleRobot, layer: ModuleEntry, link: Link, mistakes: Mistakes
 ) -> None:
     path, module = layer
-    inner = path if path[0] == "modules" else None
     try:
         name, args, options = module_call(module, link)
         made = robot.add_module(name, *args, **options)
         if path[0] == "scan":
             robot.svg.insert(1, made.svg)  # after the title, under the body
-    except ModuleNotFound as error:
-        mistakes.add((*path, "name"), str(error))
-    except WrongArguments as error:
-        for wrong in error.wrong:
-            place = wrong.path if inner else ()
-            mistakes.add((*path, *place), wrong_argument(module, wrong))
     except WebMapError as error:
-        # The error of a module begins with the name of the argument.
-        key = str(error).partition(" ")[0].rstrip(":")
-        place = ("options", key) if inner and key in module.options else ()
-        text = f"{module.name}: {error}" if inner else str(error)
-        mistakes.add((*path, *place), text)
+        note_refused(mistakes, path, module, error)
     except Exception as error:  # a module from elsewhere may raise anything
         text = f"{type(error).__name__}: {error}"
         mistakes.add(path, f"{module.name} refused its arguments: {text}")
 
 
-def wrong_argument(module: ModuleConfig, wrong: WrongArgument) -> str:
+def note_refused(
+    mistakes: Mistakes, path: KeyPath, module: ModuleConfig, error: WebMapError
+) -> None:
+    """Add the error of a module that was not added.
+
+    Args:
+        mistakes: The list for every mistake.
+        path: The key that adds the module; only that of a whole module has keys inside.
+        module: The module.
+        error: The error.
+
+    """
+    is_whole = "modules" in path
+    if isinstance(error, ModuleNotFound):
+        mistakes.add((*path, "name"), str(error))
+    elif isinstance(error, WrongArguments):
+        for wrong in error.wrong:
+            place = wrong.path if is_whole else ()
+            mistakes.add((*path, *place), _wrong_argument(module, wrong))
+    else:
+        # The error of a module begins with the name of the argument.
+        key = str(error).partition(" ")[0].rstrip(":")
+        inside = ("options", key) if is_whole and key in module.options else ()
+        text = f"{module.name}: {error}" if is_whole else str(error)
+        mistakes.add((*path, *inside), text)
+
+
+def _wrong_argument(module: ModuleConfig, wrong: WrongArgument) -> str:
     """Return the error message for a wrong argument, with the expected value."""
     if not wrong.got:
         return f"{module.name}: {wrong.text}"

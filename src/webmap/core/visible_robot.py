@@ -11,15 +11,7 @@ from typing import Any
 from webmap.base.audience import audience
 from webmap.base.geometry import Pose, Quaternion, Twist, Vector3
 from webmap.base.scope import Removal, keep
-from webmap.config.checks import Mistakes
-from webmap.config.reading import Config, read
-from webmap.config.robot import (
-    BATTERY_LOW,
-    PARTS,
-    OdometryConfig,
-    RobotConfig,
-    TfConfig,
-)
+from webmap.config.robot import BATTERY_LOW, MOTION, OdometryConfig, TfConfig
 from webmap.core.movable_robot import MovableRobot, sets_part
 from webmap.core.pose_source import PoseSource
 from webmap.core.problems import Problems
@@ -49,6 +41,9 @@ log = logging.getLogger("webmap.robot")
 POSE_LIMIT = 1.0
 """Seconds after which a pose is drawn as stale."""
 
+KEYS = ("tags", "battery_low", "odometry", "tf", "alignment", *MOTION)
+"""The keys of a robot's configuration that :meth:`VisibleRobot.configure` sets."""
+
 robots: "weakref.WeakValueDictionary[str, VisibleRobot]" = weakref.WeakValueDictionary()
 """All robots that were created and not destroyed, by their id."""
 
@@ -59,7 +54,7 @@ class VisibleRobot(MovableRobot):
     The arguments are those of :class:`webmap.Robot`.
     """
 
-    _parts = PARTS
+    _keys = KEYS
 
     def __init__(
         self,
@@ -269,7 +264,7 @@ class VisibleRobot(MovableRobot):
 
         """
 
-    def _set_part(self, key: str, part: Config | None, bridge: Bridge | None) -> None:
+    def _set(self, key: str, part: Any, bridge: Bridge | None) -> None:
         source = self.pose_source
         if isinstance(part, OdometryConfig) and bridge is not None:
             source.follow(bridge, part)
@@ -279,8 +274,15 @@ class VisibleRobot(MovableRobot):
             source.unfollow()
         elif key == "tf":
             source.unplace()
+        elif key == "alignment":
+            source.align(None if part is None else alignment(*part))
+        elif key == "tags":
+            self.tags = tuple(part)
+            self.motion.set_tags(self.tags)
+        elif key == "battery_low":
+            self.battery_low = part
         else:
-            super()._set_part(key, part, bridge)
+            super()._set(key, part, bridge)
             twist = self.motion.config.twist
             holonomic = twist is not None and twist.holonomic
             self.svg.set("data-holonomic", "" if holonomic else None)
@@ -324,8 +326,7 @@ class VisibleRobot(MovableRobot):
             ConfigError: If a tag is no text of one line with at most 100 characters.
 
         """
-        self.tags = tuple(self._checked("tags", tags))
-        self.motion.set_tags(self.tags)
+        self.configure("tags", tags)
 
     def set_battery_low(self, charge: float) -> None:
         """Set the charge below which the battery is low.
@@ -337,7 +338,7 @@ class VisibleRobot(MovableRobot):
             ConfigError: If it is no number from 0 to 1.
 
         """
-        self.battery_low = float(self._checked("battery_low", charge))
+        self.configure("battery_low", charge)
 
     @property
     def charge(self) -> float | None:
@@ -348,12 +349,6 @@ class VisibleRobot(MovableRobot):
             if isinstance(charge, float) and (least is None or charge < least):
                 least = charge
         return least
-
-    def _checked(self, key: str, value: Any) -> Any:
-        mistakes = Mistakes()
-        config = read(RobotConfig, {"name": self.name, key: value}, (), mistakes)
-        mistakes.refuse(f"robot {self.name!r}")
-        return getattr(config, key)
 
     # Display.
 

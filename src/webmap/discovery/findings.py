@@ -3,12 +3,11 @@
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, NamedTuple, TypeAlias, get_args
+from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 from webmap.config.checks import same_name
 from webmap.config.motion import (
     InitialPoseConfig,
-    MotionConfig,
     MoveConfig,
     TwistConfig,
 )
@@ -181,7 +180,7 @@ class FoundRobot:
             bridge=bridge,
             odometry=self._odometry(),
             tf=self.tf,
-            motion=self._motion(),
+            **self._motion(),
             scan=[scan] if scan else [],
             battery=self.topic("battery"),
             cameras=[_camera(guess) for guess in cameras],
@@ -194,7 +193,7 @@ class FoundRobot:
             return None
         return OdometryConfig(topic=where.topic, type=where.type or None)
 
-    def _motion(self) -> MotionConfig:
+    def _motion(self) -> dict[str, Any]:
         frame, action = self.map_frame, self.action
         velocity, pose = self.first("velocity"), self.topic("initialpose")
         twist = move = place = None
@@ -211,7 +210,7 @@ class FoundRobot:
             )
         if pose:
             place = InitialPoseConfig(topic=pose, frame=frame)
-        return MotionConfig(twist=twist, move=move, initial_pose=place)
+        return {"twist": twist, "move": move, "initial_pose": place}
 
 
 @dataclass(frozen=True, slots=True)

@@ -106,10 +106,10 @@ def _robot(
     for index, guess in enumerate(robot.guesses.get("camera", ())):
         behind[(*path, "cameras", index)] = guess.rule
     pose = robot.first("initialpose")
-    if pose is not None and config.motion.initial_pose is not None:
-        framed = ("topic",) if config.motion.initial_pose.frame != "map" else ()
+    if pose is not None and config.initial_pose is not None:
+        framed = ("topic",) if config.initial_pose.frame != "map" else ()
         behind[(*path, "initial_pose", *framed)] = pose.rule
-    if config.motion.twist is not None:
+    if config.twist is not None:
         remarks.below[(*path, "twist")] = UNSURE
     behind[(*path, "tf", "quiet")] = (
         "its pose comes from its frames"

@@ -98,12 +98,7 @@ def robots_in_file(file: Path) -> AgentRobots:
         AgentRobot(robot.motion.id, config)
         for robot, config in zip(made, configs, strict=True)
     ]
-    grids: dict[str, dict[str, Any]] = {}
-    for grid in fleet.map:
-        options = {"palette": grid.palette, "order": grid.order}
-        grids[grid.topic] = {
-            key: value for key, value in options.items() if value is not None
-        }
+    grids = {grid.topic: grid.options for grid in fleet.map}
     return AgentRobots(bridge, lambda: robots, lambda: grids, pictures)
 
 
@@ -125,7 +120,10 @@ def moving_parts(config: RobotConfig) -> RobotConfig:
         base_link=base,
         odometry=config.odometry,
         alignment=config.alignment,
-        motion=config.motion,
+        twist=config.twist,
+        move=config.move,
+        initial_pose=config.initial_pose,
+        scan_assist=config.scan_assist,
     )
 
 

@@ -1,11 +1,10 @@
 """A fleet file: its bridges, robots, maps and modules are made, checked and shown."""
 
 import logging
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -16,13 +15,13 @@ from webmap.base.local_plane import LocalPlane
 from webmap.base.map_file import read_map
 from webmap.config.checks import KeyPath, Mistakes, WrongConfig
 from webmap.config.fleet import FleetConfig, ImageConfig, TilesConfig, read_fleet
-from webmap.config.robot import MOTION, ModuleConfig, PictureConfig, RobotConfig
+from webmap.config.robot import ModuleConfig, PictureConfig, RobotConfig
 from webmap.config.toml_text import read_text, readable_secret
 from webmap.core.alignment_store import store
-from webmap.core.module_arguments import WrongArguments, check_arguments
+from webmap.core.module_arguments import check_arguments
 from webmap.core.pictures import pictures
 from webmap.core.registry import map_modules
-from webmap.core.robot import module_call, wrong_argument
+from webmap.core.robot import ModuleCall, module_call, note_refused
 from webmap.features.labels.label_store import label_file, read_labels
 from webmap.features.tiles.tile_source import open_tiles
 from webmap.fleet.remote_robots import find_agents
@@ -34,14 +33,6 @@ if TYPE_CHECKING:
     from webmap import Bridge, Robot
 
 log = logging.getLogger("webmap.cli")
-
-
-class MapModule(NamedTuple):
-    """A module of the key ``modules``, with the arguments of its constructor."""
-
-    name: str
-    args: tuple[Any, ...]
-    options: dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +47,7 @@ class ReadyFleet:
     """Modules of the map with their arguments, by their names."""
     images: list[tuple[str, float, float, float, float]]
     """Pictures as ``Map.add_image`` takes them."""
-    others: list[MapModule]
+    others: list[ModuleCall]
     """Further modules of the map that the file lists."""
     agents: list[str]
     """The addresses of routers with agents."""
@@ -160,8 +151,8 @@ def _without(config: RobotConfig, wrong: list[KeyPath]) -> RobotConfig | None:
         key = str(path[2]) if len(path) > 2 else "name"
         if key in ("name", "bridge"):
             return None
-        if hasattr(plain, key) or key in MOTION:  # else there is no such key
-            config = config.with_part(key, plain.part(key))
+        if key in RobotConfig.__struct_fields__:  # else there is no such key
+            config = config.with_part(key, getattr(plain, key))
     return config
 
 
@@ -170,7 +161,7 @@ def check_modules(
     bridges: Mapping[str, "Bridge"],
     folder: Path,
     mistakes: Mistakes,
-) -> list[MapModule]:
+) -> list[ModuleCall]:
     """Return the modules of the map; note arguments that a module refuses.
 
     Args:
@@ -186,15 +177,12 @@ def check_modules(
         name, args, options = module_call(module, bridges.__getitem__)
         try:
             check_arguments(map_modules[name], args, options)
-        except WrongArguments as error:
-            for wrong in error.wrong:
-                mistakes.add((*path, *wrong.path), wrong_argument(module, wrong))
         except WebMapError as error:
-            mistakes.add((*path, "name"), str(error))
+            note_refused(mistakes, path, module, error)
         else:
             if name == "MapFile":
                 args, options = _map_file(module, folder, path, mistakes)
-            found.append(MapModule(name, args, options))
+            found.append((name, args, options))
     return found
 
 
@@ -245,11 +233,9 @@ def show_scenery(shown: console.Console, ready: ReadyFleet) -> None:
     for image in ready.images:
         shown.add_image(*image)
     for grid in ready.fleet.map:
-        options = {"palette": grid.palette, "order": grid.order}
-        chosen = {key: value for key, value in options.items() if value is not None}
-        shown.add_grid(ready.bridges[grid.bridge], grid.topic, **chosen)
-    for module in ready.others:
-        shown.add_module(module.name, *module.args, **module.options)
+        shown.add_grid(ready.bridges[grid.bridge], grid.topic, **grid.options)
+    for name, args, others in ready.others:
+        shown.add_module(name, *args, **others)
 
 
 def restore(robots: "list[Robot]") -> None:
@@ -261,14 +247,9 @@ def restore(robots: "list[Robot]") -> None:
 PICTURES = (".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".svg", ".tif", ".tiff")
 """Suffixes of pictures; such a file in place of a YAML file is a common mistake."""
 
-NEEDED = ("name", "x", "y")
-"""The required keys of a label."""
-
 
 def check_floor(floor: Path, mistakes: Mistakes) -> None:
     """Note the mistakes of a floor plan."""
-    from webmap.console.floor import load_floor
-
     if floor.suffix.lower() in PICTURES:
         mistakes.add(
             ("floor",),
@@ -277,8 +258,7 @@ def check_floor(floor: Path, mistakes: Mistakes) -> None:
         )
         return
     try:
-        with tempfile.TemporaryDirectory() as folder:
-            load_floor(floor, Path(folder))
+        read_map(floor)
     except (ConfigError, OSError) as error:
         mistakes.add(("floor",), str(error))
 
@@ -330,8 +310,7 @@ def label_options(places: Any, folder: Path, mistakes: Mistakes) -> dict[str, An
 
     """
     if not isinstance(places, str):
-        for index, each in enumerate(places):
-            _check_label(each, ("labels", index), mistakes)
+        read_labels(places, ("labels",), mistakes)
         return {"labels": places}
     file = folder / places
     try:
@@ -339,21 +318,6 @@ def label_options(places: Any, folder: Path, mistakes: Mistakes) -> dict[str, An
     except ConfigError as error:
         mistakes.add(("labels",), str(error))
     return {"file": str(file.absolute())}
-
-
-def _check_label(label: Any, path: KeyPath, mistakes: Mistakes) -> None:
-    there = label if isinstance(label, dict) else NEEDED
-    missing = [key for key in NEEDED if key not in there]
-    for key in missing:
-        mistakes.add(path, f'the key "{key}" is missing')
-    if missing:
-        return
-    try:
-        read_labels([label], "")
-    except ConfigError as error:
-        # The label was read as item 0 of a list; its index in the file may differ.
-        _, *inner = getattr(error, "path", (0,))
-        mistakes.add((*path, *inner), getattr(error, "text", str(error)))
 
 
 def tile_options(

@@ -158,9 +158,10 @@ class Overrides:
         config = robot.config(url)
         if not has_gate(url):
             log.warning("%s: no gate can move robots behind %s", robot.name, url)
-            config = msgspec.structs.replace(config, motion=MotionConfig())
+            nothing = msgspec.structs.asdict(MotionConfig())
+            config = msgspec.structs.replace(config, **nothing)
         cameras = named_cameras(config.cameras[:MOST_CAMERAS])
-        twist = config.motion.twist
+        twist = config.twist
         if twist is not None:
             known = msgspec.structs.replace(twist, **self._of_every_base)
             config = config.with_part("twist", known)

@@ -30,8 +30,9 @@ from webmap.base.lifecycle import lifecycle
 from webmap.base.scope import no_scope
 from webmap.base.tasks import spawn
 from webmap.base.text import counted
+from webmap.config.checks import Mistakes
 from webmap.config.fleet import MapConfig
-from webmap.config.reading import read_part
+from webmap.config.reading import read
 from webmap.config.robot import PictureConfig, RobotConfig
 from webmap.console import Console, make_robot
 from webmap.console.robot_looks import draw_picture
@@ -283,10 +284,11 @@ class RemoteAgents:
             agent.alignment = about.alignment
             align_bridge(agent.bridge, *about.alignment)
         for topic, given in about.grids[:MOST_GRIDS]:
-            grid = read_part(MapConfig, "map", {**given, "topic": topic}, agent.name)
-            options = {"palette": grid.palette, "order": grid.order}
-            chosen = {key: value for key, value in options.items() if value is not None}
-            console.add_grid(agent.bridge, grid.topic, **chosen)
+            wrong = Mistakes()
+            grid = read(MapConfig, {**given, "topic": topic}, ("map",), wrong)
+            wrong.refuse(agent.name)
+            assert grid is not None, "a table without a mistake is a map"
+            console.add_grid(agent.bridge, grid.topic, **grid.options)
         there = {id_at_agent(agent.name, name): each for name, each in robots.items()}
         for id in agent.robots.keys() - there.keys():
             async with self._piece_of_work():

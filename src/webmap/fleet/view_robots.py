@@ -102,7 +102,7 @@ class ViewRobot:
         if tf is not None:
             config = config.with_part("tf", tf)
         for key in ("initial_pose", "move"):
-            part = config.part(key)
+            part = getattr(config, key)
             if part is not None and part.frame != frame:
                 part = msgspec.structs.replace(part, frame=frame)
                 config = config.with_part(key, part)
@@ -262,7 +262,11 @@ class ViewRobots:
             if role in fixed or role not in PARTS:
                 continue
             key = PARTS[role]
-            old, part, topics = new.part(key), wanted.part(key), [found.topic(role)]
+            old, part, topics = (
+                getattr(new, key),
+                getattr(wanted, key),
+                [found.topic(role)],
+            )
             if isinstance(part, list):
                 own = [layer for layer in wanted.layers() if layer.path[0] == key]
                 more = {
@@ -271,7 +275,7 @@ class ViewRobots:
                     if topic_of(layer.module) not in drawn
                 }
                 part, topics = [*old, *more.values()], list(more)
-            if part != shown.config.part(key):
+            if part != getattr(shown.config, key):
                 used += [(key, f"{role} {topic}") for topic in topics]
             new = new.with_part(key, part)
         wrong = shown.use(new)

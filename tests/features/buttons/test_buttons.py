@@ -14,8 +14,9 @@ from equipment.waiting import until
 from equipment.webmap_process import simulator
 from webmap import Bridge, Robot
 from webmap.base.errors import ConfigError
-from webmap.config.buttons import check_buttons, read_buttons
+from webmap.config.buttons import ButtonConfig, read_buttons
 from webmap.config.checks import Mistakes
+from webmap.config.reading import read
 from webmap.core.base_page import PageEntry
 from webmap.core.operators import Viewer
 from webmap.core.page import Page
@@ -74,9 +75,9 @@ def test_an_invalid_button_is_refused_with_the_wrong_key(change, key, words):
     data = {**DOCK, **change}
     data = {name: value for name, value in data.items() if value is not None}
     mistakes = Mistakes()
-    check_buttons([data], (), mistakes)
+    read(ButtonConfig, data, (), mistakes)
     ((path, message),) = mistakes.found
-    assert path == (0, *filter(None, key.split(".")))
+    assert path == tuple(filter(None, key.split(".")))
     assert words in message
 
 
@@ -167,13 +168,13 @@ def test_a_button_with_confirm_asks_its_own_question_or_the_usual_one():
 
 def test_more_than_a_hundred_buttons_are_refused():
     many = ({"label": f"{number}", "service": "/s"} for number in range(1000))
-    with pytest.raises(ConfigError, match="button number 100: expected at most 100"):
+    with pytest.raises(ConfigError, match=r"buttons\[100\]: expected at most 100"):
         read_buttons(many)
 
 
 def test_two_buttons_with_the_same_label_are_refused(link, robot):
     with pytest.raises(
-        ConfigError, match=r"button 'Dock': label: .*no other button has"
+        ConfigError, match=r"buttons\[1\]\.label: got .*no other button has"
     ):
         robot.add_module("Buttons", link, [DOCK, DOCK])
 

@@ -101,9 +101,15 @@ def test_a_saved_label_is_shown_and_can_be_deleted(map, page, state, said):
 @pytest.mark.parametrize(
     ("add", "words"),
     [
-        ({"name": "x", "x": None, "y": 0}, "x: expected a number of metres, got None"),
-        ({"name": " ", "x": 0, "y": 0}, "name: expected 1 to 60 characters"),
-        ({"name": "x", "x": 0, "y": 0, "id": "c0"}, "no such key"),
+        (
+            {"name": "x", "x": None, "y": 0},
+            "x: got the value None, expected a number of metres",
+        ),
+        (
+            {"name": " ", "x": 0, "y": 0},
+            'name: got the text " ", expected a text of 1 to 60 characters',
+        ),
+        ({"name": "x", "x": 0, "y": 0, "id": "c0"}, 'there is no key "id"'),
         ("x", "expected a table"),
     ],
 )
@@ -132,7 +138,7 @@ def test_a_moved_label_moves_on_all_maps_and_is_saved(map, page, state, said):
         assert dock._transform == (-1.5, 7.0, 0.0)
         assert said == [{"done": True}] * 2
         for wrong, words in (
-            ({"move": dock.get("data-label"), "to": {"x": 1}}, "y: expected a number"),
+            ({"move": dock.get("data-label"), "to": {"x": 1}}, "y: got the value None"),
             ({"move": dock.get("data-label")}, "x and y, in metres"),
             ({"move": desk.get("data-label"), "to": {"x": 1, "y": 1}}, "configuration"),
             ({"move": "nobody", "to": {"x": 1, "y": 1}}, "already deleted"),
@@ -262,7 +268,7 @@ def test_labels_of_a_file_follow_labels_of_the_program(map, page, tmp_path):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"labels": [{"name": "x"}]}, r"labels\[0\].x: expected a number"),
+        ({"labels": [{"name": "x"}]}, r"labels\[0\]: the key .x. is missing"),
         ({"key": "ll"}, "key must be one character"),
         ({"name": "../x"}, "letters, digits"),
         ({"file": "/no/such"}, "No such file"),

@@ -10,54 +10,72 @@ from webmap.features.labels.label_store import (
     ICONS,
     Label,
     LabelStore,
+    given_labels,
     label_file,
     new_label,
-    read_labels,
 )
 
 DOCK = {"name": "Dock", "x": 1, "y": -2.5, "icon": "charger", "kind": "a-b", "yaw": 3}
 
 
 def test_a_list_of_tables_is_read_as_labels():
-    one, two = read_labels([DOCK, {"name": " Tür <b> ", "x": 0, "y": 0}], "it")
+    one, two = given_labels([DOCK, {"name": " Tür <b> ", "x": 0, "y": 0}], "it")
     assert one == Label("Dock", 1.0, -2.5, "charger", "a-b", 3.0, "c0")
     assert (two.name, two.icon, two.kind, two.yaw) == ("Tür <b>", "pin", "", None)
-    assert read_labels({"labels": [DOCK]}, "it") == (one,)
+    assert given_labels({"labels": [DOCK]}, "it") == (one,)
 
 
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"name": ""}, "it[0].name: expected 1 to 60 characters, got ''"),
-        ({"name": "x" * 61}, "it[0].name: expected 1 to 60"),
-        ({"name": 5}, "it[0].name: expected"),
-        ({"x": "1"}, "it[0].x: expected a number of metres, got '1'"),
-        ({"x": None}, "it[0].x: expected a number of metres"),
-        ({"x": True}, "it[0].x: expected a number"),
-        ({"y": float("nan")}, "it[0].y: expected a number of metres, got nan"),
-        ({"y": 1e7}, "it[0].y: expected a number"),
-        ({"yaw": "north"}, "it[0].yaw: expected a number of radians"),
-        ({"icon": "rocket"}, "it[0].icon: expected one of pin, charger"),
-        ({"icon": ["pin"]}, "it[0].icon: expected one of"),
-        ({"kind": "a b"}, "it[0].kind: expected the name of a class, got 'a b'"),
-        ({"nmae": "x"}, "it[0].'nmae': no such key; did you mean \"name\"?"),
+        (
+            {"name": ""},
+            'it[0].name: got the text "", expected a text of 1 to 60 characters',
+        ),
+        ({"name": "x" * 61}, "expected a text of 1 to 60"),
+        ({"name": 5}, "it[0].name: got the whole number 5, expected a text"),
+        ({"x": "1"}, 'it[0].x: got the text "1", expected a number of metres'),
+        ({"x": None}, "it[0].x: got the value None, expected a number of metres"),
+        ({"x": True}, "it[0].x: got the boolean true, expected a number"),
+        (
+            {"y": float("nan")},
+            "it[0].y: got the number nan, expected a number of metres",
+        ),
+        ({"y": 1e7}, "it[0].y: got the number 10000000.0, expected a number"),
+        (
+            {"yaw": "north"},
+            'it[0].yaw: got the text "north", expected a number of radians',
+        ),
+        (
+            {"icon": "rocket"},
+            'it[0].icon: got the text "rocket", expected "pin" or "charger"',
+        ),
+        ({"icon": ["pin"]}, "it[0].icon: got the array"),
+        (
+            {"kind": "a b"},
+            'it[0].kind: got the text "a b", expected the name of a class',
+        ),
+        (
+            {"nmae": "x"},
+            'it[0].nmae: there is no key "nmae" here; did you mean "name"?',
+        ),
     ],
 )
 def test_an_invalid_label_is_refused_with_its_field(change, words):
     with pytest.raises(ConfigError) as error:
-        read_labels([{**DOCK, **change}], "it")
+        given_labels([{**DOCK, **change}], "it")
     assert words in str(error.value)
 
 
 @pytest.mark.parametrize("data", [None, 3, "text", {"label": []}, [1], [[]]])
 def test_data_other_than_a_list_of_tables_is_refused(data):
-    with pytest.raises(ConfigError, match=r"expected|no such key"):
-        read_labels(data, "it")
+    with pytest.raises(ConfigError, match=r"expected|there is no key"):
+        given_labels(data, "it")
 
 
 def test_more_than_2000_labels_are_refused():
     with pytest.raises(ConfigError, match="expected at most 2000 labels"):
-        read_labels([DOCK] * 2001, "it")
+        given_labels([DOCK] * 2001, "it")
 
 
 @pytest.mark.parametrize(
@@ -77,19 +95,28 @@ def test_a_label_file_may_be_yaml_or_json(tmp_path, name, text):
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (b"", "expected a list of labels, got None"),
+        (b"", "got the value None, expected a list of labels"),
         (b"- name: [", r"a\.yaml:1: this is not YAML"),
         (b"\xff\xfe\x00", "this is not YAML"),
         (b"!!python/object/apply:os.system ['true']", "not YAML"),
         (b"[" * 50_000, "nested more than 50 deep"),
         (b"a: &a [1]\nb: *a", r"a\.yaml:2: this is not YAML: aliases"),
-        (b"- {name: A, x: 1, y: 2}\n- {}\n", r"a\.yaml:2: labels\[1\]\.name: expected"),
-        (b"labels:\n- name: A\n  x: 1\n  y: '2'\n", r":4: labels\[0\]\.y: expected a"),
+        (
+            b"- {name: A, x: 1, y: 2}\n- {}\n",
+            r"a\.yaml:2: labels\[1\]: the key \"name\" is m",
+        ),
+        (
+            b"labels:\n- name: A\n  x: 1\n  y: '2'\n",
+            r":4: labels\[0\]\.y: got the text",
+        ),
         (
             b"- name: A\n  x: 1\n  y: 2\n  iocn: pin\n",
-            r":4: labels\[0\]\.'iocn': no",
+            r":4: labels\[0\]\.iocn: there is no",
         ),
-        (b"- name: A\n  x: 1\n  y: 2\n  it's: 3\n", r":4: labels\[0\]\.\"it's\": no"),
+        (
+            b"- name: A\n  x: 1\n  y: 2\n  it's: 3\n",
+            r":4: labels\[0\]\.it's: there is no",
+        ),
         (b"x" * (1 << 20) + b"xx", "larger than 256 KiB"),
     ],
 )

@@ -107,9 +107,12 @@ def test_closing_a_page_does_not_wait_for_the_reading_of_a_tile(
     [
         ({"datum": (91, 0)}, "datum is a latitude and a longitude"),
         ({"datum": (50,)}, "datum: expected 2 in a list: a number, a number"),
-        ({"tile_size": 100}, "tile_size is 256 or 512"),
-        ({"most": 0}, "most is a number of tiles up to 256"),
-        ({"opacity": 2}, "opacity is from 0 to 1"),
+        ({"tile_size": 300}, "tile_size: got the whole number 300, expected 256 or"),
+        (
+            {"most": 0},
+            "most: got the whole number 0, expected a whole number from 1 to",
+        ),
+        ({"opacity": 2}, "opacity: got the whole number 2, expected a number of full"),
         ({"east": float("inf")}, "east must be finite"),
         ({"source": "https://tiles.example"}, "this machine's disk alone"),
     ],

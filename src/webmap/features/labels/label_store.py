@@ -1,18 +1,19 @@
 """Labels, and the files that store them."""
 
 import json
-import math
 import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.base.identifiers import generate_id
 from webmap.base.plain_files import LARGEST_STATE, read_file, write_file
-from webmap.config.checks import did_you_mean
+from webmap.config import checks
+from webmap.config.checks import KeyPath, Mistakes, expecting, key_path_text
+from webmap.config.reading import Config, read
 
 ICONS = {
     "pin": "M12 21c-4-4.4-6-7.7-6-10.800a6 6 0 0 1 12 0c0 3.1-2 6.4-6 10.800z"
@@ -33,76 +34,92 @@ ICONS = {
 
 MAX_LABELS = 2000
 MAX_NAME = 60
-FARTHEST = 1e6
-"""Greatest distance from the origin, in metres."""
 
-_KEYS = ("name", "x", "y", "icon", "kind", "yaw")
 _STORE = re.compile(r"[A-Za-z0-9_-]{1,40}")
 _KIND = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,39}")
 
 
-class Label(msgspec.Struct, frozen=True):
-    """A named place on the map."""
+def _name(value: Any) -> str:
+    name = checks.text(value).strip()
+    if len(value) > MAX_NAME:
+        raise ConfigError(f"at most {MAX_NAME} characters")
+    return "".join(c if c.isprintable() else " " for c in name)
 
-    name: str
-    x: float
-    """In metres."""
 
-    y: float
-    """In metres."""
+def _kind(value: Any) -> str:
+    if value and not _KIND.fullmatch(checks.text(value)):
+        raise ConfigError("letters, digits, '-' and '_'")
+    return value or ""
 
-    icon: str = "pin"
-    kind: str = ""
+
+class LabelConfig(Config, frozen=True):
+    """A label in a file: a named place on the map."""
+
+    name: Annotated[str, expecting(f"a text of 1 to {MAX_NAME} characters", _name)]
+    x: Annotated[float, checks.finite("a number of metres")]
+    y: Annotated[float, checks.finite("a number of metres")]
+    icon: Annotated[str, checks.one_of(*ICONS)] = "pin"
+    kind: Annotated[str, expecting("the name of a class", _kind)] = ""
     """An additional CSS class."""
 
-    yaw: float | None = None
-    """Heading of a robot at the label, in radians; None for any."""
+    yaw: Annotated[float, checks.finite("a number of radians")] | None = None
+    """Heading of a robot at the label; None for any."""
+
+
+class Label(LabelConfig, frozen=True):
+    """A label on a map."""
 
     id: str = ""
     kept: bool = False
     """Whether the label was added on a page."""
 
+    @property
+    def plain(self) -> dict[str, Any]:
+        """The label as in a file."""
+        return {key: getattr(self, key) for key in LabelConfig.__struct_fields__}
 
-def read_labels(data: Any, of: str) -> tuple[Label, ...]:
+
+def read_labels(data: Any, path: KeyPath, mistakes: Mistakes) -> tuple[Label, ...]:
     """Return labels from plain data: a list of tables, or a table with ``labels``.
 
     Args:
         data: Data as read from YAML, JSON or TOML.
+        path: The keys that lead to the data, for errors.
+        mistakes: The list for every mistake.
+
+    """
+    if isinstance(data, Mapping) and set(data) == {"labels"}:
+        data = data["labels"]
+    if isinstance(data, str | bytes | Mapping) or not isinstance(data, Iterable):
+        mistakes.add(path, f"got {checks.show(data)}, expected a list of labels")
+        return ()
+    found = []
+    for number, each in enumerate(data):
+        if number == MAX_LABELS:
+            text = f"expected at most {MAX_LABELS} labels, got more"
+            mistakes.add((*path, number), text)
+            break
+        plain = each.plain if isinstance(each, Label) else each
+        label = read(LabelConfig, plain, (*path, number), mistakes)
+        if label is not None:
+            found.append(Label(**msgspec.structs.asdict(label), id=f"c{number}"))
+    return tuple(found)
+
+
+def given_labels(data: Any, of: str) -> tuple[Label, ...]:
+    """Return labels from plain data, as :func:`read_labels` does.
+
+    Args:
+        data: The data.
         of: The name of the source, for people.
 
     Raises:
         ConfigError: If a label is not valid; the error has its number and its key.
     """
-    if isinstance(data, Mapping) and set(data) == {"labels"}:
-        data = data["labels"]
-    if isinstance(data, str | bytes) or not isinstance(data, Iterable):
-        raise _LabelError((), of, f"expected a list of labels, got {_show(data)}")
-    found: list[Label] = []
-    for number, each in enumerate(data):
-        if len(found) == MAX_LABELS:
-            raise ConfigError(f"{of}: expected at most {MAX_LABELS} labels, got more")
-        if isinstance(each, Label):
-            each = msgspec.structs.asdict(each)
-            each = {key: each[key] for key in _KEYS}
-        try:
-            found.append(_label(each, f"{of}[{number}]"))
-        except _LabelError as error:
-            raise error.inside(number) from None
-    return tuple(
-        msgspec.structs.replace(label, id=f"c{number}")
-        for number, label in enumerate(found)
-    )
-
-
-class _LabelError(ConfigError):
-    """An error in a label, with its position in the file."""
-
-    def __init__(self, path: tuple[str | int, ...], of: str, text: str) -> None:
-        super().__init__(f"{of}: {text}" if of else text)
-        self.path, self.of, self.text = path, of, text
-
-    def inside(self, number: int) -> "_LabelError":
-        return _LabelError((number, *self.path), self.of, self.text)
+    mistakes = Mistakes()
+    labels = read_labels(data, (of,), mistakes)
+    mistakes.refuse("")
+    return labels
 
 
 def label_file(file: str | Path) -> tuple[Label, ...]:
@@ -114,22 +131,26 @@ def label_file(file: str | Path) -> tuple[Label, ...]:
     """
     from webmap.base.lined_yaml import LinedYaml
 
-    document = LinedYaml(Path(file))
-    try:
-        return read_labels(document.data, "labels")
-    except _LabelError as error:
-        table = isinstance(document.data, Mapping) and set(document.data) == {"labels"}
-        path = ("labels", *error.path) if table else error.path
-        raise document.wrong(path, str(error)) from None
+    document, mistakes = LinedYaml(Path(file)), Mistakes()
+    labels = read_labels(document.data, ("labels",), mistakes)
+    if mistakes.found:
+        path, text = mistakes.found[0]
+        place = path if isinstance(document.data, Mapping) else path[1:]
+        raise document.wrong(place, f"{key_path_text(path)}: {text}")
+    return labels
 
 
-def new_label(data: Mapping[str, Any]) -> Label:
+def new_label(data: Any) -> Label:
     """Return a label that was added on a page.
 
     Raises:
         ConfigError: If the data is not valid; the error names the key.
     """
-    return msgspec.structs.replace(_label(data, ""), id=generate_id(), kept=True)
+    mistakes = Mistakes()
+    label = read(LabelConfig, data, (), mistakes)
+    mistakes.refuse("")
+    assert label is not None, "a table without a mistake is a label"
+    return Label(**msgspec.structs.asdict(label), id=generate_id(), kept=True)
 
 
 def moved_label(label: Label, data: Any) -> Label:
@@ -144,8 +165,7 @@ def moved_label(label: Label, data: Any) -> Label:
     """
     if not isinstance(data, Mapping):
         raise ConfigError("a label is moved to x and y, in metres")
-    plain = {key: getattr(label, key) for key in _KEYS}
-    moved = _label({**plain, "x": data.get("x"), "y": data.get("y")}, "")
+    moved = new_label({**label.plain, "x": data.get("x"), "y": data.get("y")})
     return msgspec.structs.replace(moved, id=label.id, kept=label.kept)
 
 
@@ -162,9 +182,8 @@ class LabelStore:
 
     def __init__(self, folder: Path, name: str) -> None:
         if not _STORE.fullmatch(name):
-            raise ConfigError(
-                f"name: letters, digits, '-' and '_', up to 40; got {_show(name)}"
-            )
+            expected = "letters, digits, '-' and '_', up to 40"
+            raise ConfigError(f"name: got {checks.show(name)}, expected {expected}")
         self.file = folder / "labels" / f"{name}.json"
 
     def load(self) -> tuple[Label, ...]:
@@ -179,7 +198,7 @@ class LabelStore:
             return ()
         except (OSError, ValueError, RecursionError) as error:
             raise ConfigError(f"{self.file} cannot be read: {error}") from None
-        labels = read_labels(data, self.file.name)
+        labels = given_labels(data, self.file.name)
         return tuple(
             msgspec.structs.replace(label, id=generate_id(), kept=True)
             for label in labels
@@ -192,49 +211,8 @@ class LabelStore:
             OSError: If the file cannot be written.
         """
         plain = [
-            {key: getattr(label, key) for key in _KEYS if getattr(label, key) != ""}
+            {key: value for key, value in label.plain.items() if value != ""}
             for label in labels
         ]
         text = json.dumps({"labels": plain}, ensure_ascii=False, indent=1)
         write_file(self.file, text.encode())
-
-
-def _label(data: Any, of: str) -> Label:
-    def wrong(key: object, text: str) -> ConfigError:
-        shown = key if key in _KEYS else _show(key)
-        return _LabelError((str(key),), f"{of}{'.' if of else ''}{shown}", text)
-
-    if not isinstance(data, Mapping):
-        raise _LabelError((), of, "expected a table with name, x and y")
-    for key in data:
-        if key not in _KEYS:
-            hint = did_you_mean(key, _KEYS)
-            raise wrong(key, f"no such key{hint}; there are {', '.join(_KEYS)}")
-    name = data.get("name")
-    if not isinstance(name, str) or not name.strip() or len(name) > MAX_NAME:
-        raise wrong("name", f"expected 1 to {MAX_NAME} characters, got {_show(name)}")
-    x, y = (_number(data.get(key), key, wrong) for key in "xy")
-    icon, kind = data.get("icon") or "pin", data.get("kind") or ""
-    if not isinstance(icon, str) or icon not in ICONS:
-        listed = ", ".join(ICONS)
-        raise wrong("icon", f"expected one of {listed}; got {_show(icon)}")
-    if kind and not (isinstance(kind, str) and _KIND.fullmatch(kind)):
-        raise wrong("kind", f"expected the name of a class, got {_show(kind)}")
-    yaw = data.get("yaw")
-    if yaw is not None:
-        yaw = _number(yaw, "yaw", wrong)
-    return Label("".join(c if c.isprintable() else " " for c in name.strip()), x, y,
-                 icon, kind, yaw)  # fmt: skip
-
-
-def _number(value: Any, key: str, wrong: Any) -> float:
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not number or not math.isfinite(value) or abs(value) > FARTHEST:
-        unit = "radians" if key == "yaw" else "metres"
-        raise wrong(key, f"expected a number of {unit}, got {_show(value)}")
-    return float(value)
-
-
-def _show(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."

@@ -19,10 +19,10 @@ from webmap.features.labels.label_store import (
     MAX_NAME,
     Label,
     LabelStore,
+    given_labels,
     label_file,
     moved_label,
     new_label,
-    read_labels,
 )
 from webmap.gate.locks import state_folder
 from webmap.scene import svg
@@ -298,9 +298,9 @@ class Labels:
         if len(key) != 1:
             raise ConfigError(f"Labels: key must be one character, got {key!r}")
         LabelStore(Path(), name)
-        configured = read_labels(labels, "labels")
+        configured = given_labels(labels, "labels")
         if file is not None:
-            configured = read_labels((*configured, *label_file(file)), "labels")
+            configured = given_labels((*configured, *label_file(file)), "labels")
         self.map = map
         self.may_edit = editable and map.page.viewer.role == "admin"
         self.layer = LabelLayer.shared(name, configured)

@@ -11,6 +11,8 @@ from webmap.base.geometry import Affine
 from webmap.base.local_plane import PLANE_RADIUS, LocalPlane
 from webmap.base.scope import Removal, keep
 from webmap.base.tasks import spawn
+from webmap.config.fleet import TilesConfig
+from webmap.config.reading import read_key
 from webmap.core.pictures import pictures
 from webmap.core.registry import map_modules
 from webmap.features.tiles.tile_source import Tile, open_tiles
@@ -26,9 +28,6 @@ ORDER = -1.0
 
 PAUSE = 0.1
 """Least time between two updates of the needed tiles, in seconds."""
-
-MOST = 256
-"""Upper limit of the option ``most``."""
 
 WORLD = 40_075_016.686
 """Length of the equator, in metres."""
@@ -83,12 +82,9 @@ class TileLayer:
             raise ConfigError(
                 f"datum is a latitude and a longitude in degrees, got {datum!r}"
             )
-        if tile_size not in (256, 512):
-            raise ConfigError(f"tile_size is 256 or 512, got {tile_size!r}")
-        if not 1 <= most <= MOST:
-            raise ConfigError(f"most is a number of tiles up to {MOST}, got {most!r}")
-        if not (0 <= opacity <= 1):
-            raise ConfigError(f"opacity is from 0 to 1, got {opacity!r}")
+        options = {"tile_size": tile_size, "most": most, "opacity": opacity}
+        for key, value in options.items():
+            read_key(TilesConfig, key, value, "TileLayer")
         plane = LocalPlane(*datum, east)
         self.map = map
         self.source = open_tiles(source)
