@@ -6,9 +6,11 @@ recordings have. Nothing is sent here.
 """
 
 import json
+import math
 import random
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import cbor2
@@ -22,7 +24,9 @@ from webmap.ros.rosbridge.events import Publish
 from webmap.ros.serialized.reader import make_reader
 from webmap.ros.serialized.schemas import Encoding, SchemaEncoding, read_schema
 from webmap.ros.serialized.writer import make_writer
+from webmap.ros.tf import Buffer
 
+FRAMES = "tf2_msgs/TFMessage"
 TOPIC = "/robot_0/topic"
 TRANSFORMS = 50
 
@@ -30,26 +34,31 @@ TRANSFORMS = 50
 def transforms(number: int) -> dict[str, Any]:
     """Return one ``tf2_msgs/TFMessage``: a chain of links, all with one stamp."""
     chance = random.Random(number)
-    stamp = {"secs": 1_700_000_000 + number, "nsecs": 372_882_366}
-    return {
-        "transforms": [
+    stamp = {
+        "secs": 1_700_000_000 + number // 20,
+        "nsecs": number % 20 * 50_000_000 + 372_882,
+    }
+    found = []
+    for link in range(TRANSFORMS):
+        turn = {axis: chance.uniform(0.1, 1.0) for axis in "xyzw"}
+        norm = math.hypot(*turn.values())
+        found.append(
             {
                 "header": {"stamp": stamp, "frame_id": f"robot_0/link_{link}"},
                 "child_frame_id": f"robot_0/link_{link + 1}",
                 "transform": {
                     "translation": {axis: chance.random() for axis in "xyz"},
-                    "rotation": {axis: chance.random() for axis in "xyzw"},
+                    "rotation": {axis: part / norm for axis, part in turn.items()},
                 },
             }
-            for link in range(TRANSFORMS)
-        ]
-    }
+        )
+    return {"transforms": found}
 
 
 MESSAGES: dict[str, tuple[type[msgspec.Struct], Callable[[int], dict[str, Any]]]] = {
     "nav_msgs/Odometry": (OdometryMsg, odometry),
     "sensor_msgs/LaserScan": (LaserScanMsg, scan),
-    "tf2_msgs/TFMessage": (TFMessage, transforms),
+    FRAMES: (TFMessage, transforms),
 }
 """The view of each type, and what makes its messages."""
 
@@ -57,27 +66,34 @@ MESSAGES: dict[str, tuple[type[msgspec.Struct], Callable[[int], dict[str, Any]]]
 def bench(*, rounds: int, quick: bool = False) -> list[Comparison]:
     """Compare the forms, for each type in turn."""
     return [
-        compare(f"One {type} into its view", _contenders(type, quick=quick), rounds)
-        for type in MESSAGES
+        *(
+            compare(f"One {type} into its view", _contenders(type, quick=quick), rounds)
+            for type in MESSAGES
+        ),
+        compare(
+            f"One {FRAMES} into the buffer of frames",
+            _contenders(FRAMES, stored=True, quick=quick),
+            rounds,
+        ),
     ]
 
 
-def _contenders(type: str, *, quick: bool) -> list[Contender]:
+def _contenders(type: str, *, quick: bool, stored: bool = False) -> list[Contender]:
     view, make = MESSAGES[type]
     made = [make(number) for number in range(VARIANTS)]
     times = 4 if quick else 40
     found = {}
     for name, packed in (("JSON", _json), ("CBOR", _cbor)):
         frames = [packed(message) for message in made]
-        found[name] = _decoding(lambda data: Publish(TOPIC, data).decode(view), frames)
+        decode = partial(_decode, view)
+        found[name] = _decoding(decode, frames, stored=stored)
     for name, encoding, language in _SERIALIZED:
         schema = read_schema(type, language)
         write, read = make_writer(schema, encoding), make_reader(schema, view, encoding)
         frames = [write(_whole(message, encoding)) for message in made]
-        found[name] = _decoding(read, frames)
+        found[name] = _decoding(read, frames, stored=stored)
     return [
-        Contender(name, lambda decode=decode: _measured(decode, times))  # type: ignore[misc]
-        for name, decode in found.items()
+        Contender(name, partial(_measured, run, times)) for name, run in found.items()
     ]
 
 
@@ -110,14 +126,26 @@ def _whole(message: dict[str, Any], encoding: Encoding) -> dict[str, Any]:
     return message
 
 
+def _decode(view: type[msgspec.Struct], data: bytes) -> Any:
+    return Publish(TOPIC, data).decode(view)
+
+
 def _decoding(
-    decode: Callable[[bytes], Any], frames: Sequence[bytes]
+    decode: Callable[[bytes], Any], frames: Sequence[bytes], *, stored: bool
 ) -> Callable[[], None]:
+    """Return what decodes all frames, and stores their transforms if asked."""
+
     def run() -> None:
         for frame in frames:
             decode(frame)
 
-    return run
+    def store() -> None:
+        buffer = Buffer()
+        for frame in frames:
+            for row in decode(frame).rows:
+                buffer.add_row(row)
+
+    return store if stored else run
 
 
 def _measured(decode: Callable[[], None], times: int) -> Figures:

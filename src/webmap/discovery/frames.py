@@ -13,7 +13,7 @@ from webmap.base.scope import no_scope
 from webmap.discovery.rules import ODOMETRY, VELOCITY, nearest
 from webmap.discovery.tf_robots import Trees
 from webmap.ros.bridge import Bridge
-from webmap.ros.messages import TFMessage
+from webmap.ros.messages import TFMessage, names_of
 from webmap.ros.names import is_topic, is_type
 from webmap.ros.temporary_bridge import TemporaryBridge
 
@@ -118,8 +118,8 @@ class FrameCollector:
         return self.trees
 
     def _receive(self, namespace: str, message: TFMessage) -> None:
-        for each in message.transforms:
-            self.trees.take(namespace, each.frame_id, each.child_frame_id)
+        for row in message.rows:
+            self.trees.take(namespace, *names_of(row))
 
     def _receive_odometry(self, topic: str, message: _Moved) -> None:
         self.trees.odometry[topic] = message.child_frame_id.strip().strip("/")
