@@ -15,11 +15,12 @@ from webmap.features.layers.marker_drawing import MarkerArrayMsg
 from webmap.ros import offload, worker
 from webmap.ros.foxglove.messages import FoxgloveMessage
 from webmap.ros.foxglove.protocol import PAYLOAD
-from webmap.ros.messages import OccupancyGridMsg, PathMsg, TFMessage, names_of
+from webmap.ros.messages import OccupancyGridMsg, PathMsg, TFMessage
 from webmap.ros.offload import Offload
 from webmap.ros.rosbridge.events import Publish
 from webmap.ros.serialized.schemas import read_schema
 from webmap.ros.serialized.writer import make_writer
+from webmap.ros.tf.buffer import names_of
 
 pytestmark = pytest.mark.slow
 

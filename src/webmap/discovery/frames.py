@@ -13,9 +13,10 @@ from webmap.base.scope import no_scope
 from webmap.discovery.rules import ODOMETRY, VELOCITY, nearest
 from webmap.discovery.tf_robots import Trees
 from webmap.ros.bridge import Bridge
-from webmap.ros.messages import TFMessage, names_of
+from webmap.ros.messages import TFMessage
 from webmap.ros.names import is_topic, is_type
 from webmap.ros.temporary_bridge import TemporaryBridge
+from webmap.ros.tf.buffer import names_of
 
 SECONDS = 0.8
 """How long to listen: a robot that moves sends its frames ten times a second."""

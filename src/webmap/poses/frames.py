@@ -12,10 +12,10 @@ from webmap.base.audience import audience
 from webmap.base.scope import Removal, no_scope
 from webmap.poses.placing import ProblemDelay
 from webmap.ros.bridge import Bridge
-from webmap.ros.messages import TFMessage, names_of
+from webmap.ros.messages import TFMessage
 from webmap.ros.subscriptions import Subscription
 from webmap.ros.tf import Buffer, TransformError
-from webmap.ros.tf.buffer import LONGEST_NAME
+from webmap.ros.tf.buffer import LONGEST_NAME, names_of
 
 log = logging.getLogger("webmap.ros.tf")
 

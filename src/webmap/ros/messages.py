@@ -403,11 +403,6 @@ TransformRow: TypeAlias = tuple[
 """The values of a :class:`TransformStampedMsg`, in the order of its fields."""
 
 
-def names_of(row: TransformRow) -> tuple[str, str]:
-    """Return the names of the parent frame and of the child frame."""
-    return row[4], row[5]
-
-
 class TFMessage(msgspec.Struct, frozen=True):
     """``tf2_msgs/TFMessage``."""
 

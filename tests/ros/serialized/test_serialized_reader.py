@@ -22,6 +22,7 @@ from webmap.ros.messages_image import CompressedImageMsg, ImageMsg
 from webmap.ros.serialized.reader import make_reader
 from webmap.ros.serialized.schemas import read_schema
 from webmap.ros.serialized.writer import make_writer
+from webmap.ros.tf.buffer import names_of
 
 VIEWS = {
     "geometry_msgs/Pose": messages.PoseMsg,
@@ -307,7 +308,7 @@ def test_messages_whose_strings_change_their_lengths_are_read(encoding):
         data = write({"transforms": transforms})
         for _ in range(2):
             found = read(data).rows
-            assert [*map(messages.names_of, found)] == [(n[::2], n) for n in names]
+            assert [*map(names_of, found)] == [(n[::2], n) for n in names]
             assert convert(plain(data), messages.TFMessage).rows == found
 
 
@@ -324,7 +325,7 @@ def test_an_array_of_many_messages_is_read(encoding):
     read, write = tools(encoding, "tf2_msgs/TFMessage", messages.TFMessage)
     names = ["x" * (each % 9) for each in range(300)]
     data = write({"transforms": [{"child_frame_id": name} for name in names]})
-    assert [messages.names_of(row)[1] for row in read(data).rows] == names
+    assert [names_of(row)[1] for row in read(data).rows] == names
     for at in range(8, 200, 4):
         lying = data[:at] + b"\xff\xff\xff\x7f" + data[at + 4 :]
         with contextlib.suppress(ProtocolError):

@@ -48,6 +48,11 @@ _SENTENCES = 100
 _MOST_PATHS = 1000
 
 
+def names_of(row: TransformRow) -> tuple[str, str]:
+    """Return the names of the parent frame and of the child frame."""
+    return row[4], row[5]
+
+
 class Found(NamedTuple):
     """The transform between two frames, as far as it is known."""
 
