@@ -13,9 +13,14 @@ from equipment.waiting import until
 from webmap.features.layers.diagnostics import DiagnosticArrayMsg
 from webmap.features.layers.marker_drawing import MarkerArrayMsg
 from webmap.ros import offload, worker
+from webmap.ros.foxglove.messages import FoxgloveMessage
+from webmap.ros.foxglove.protocol import PAYLOAD
 from webmap.ros.messages import OccupancyGridMsg, PathMsg, TFMessage
 from webmap.ros.offload import Offload
 from webmap.ros.rosbridge.events import Publish
+from webmap.ros.serialized.schemas import read_schema
+from webmap.ros.serialized.writer import make_writer
+from webmap.ros.tf.buffer import names_of
 
 pytestmark = pytest.mark.slow
 
@@ -108,6 +113,26 @@ def test_a_long_message_is_decoded_completely_and_in_order(view):
         await aside.stop()
 
     run(scenario)
+
+
+def test_a_long_serialized_message_comes_in_parts():
+    name = "tf2_msgs/TFMessage"
+    transforms = [{"child_frame_id": f"link {each}"} for each in range(9000)]
+    data = make_writer(read_schema(name, "ros2msg"), "cdr")({"transforms": transforms})
+    message = FoxgloveMessage("/tf", bytes(PAYLOAD) + data, name, "cdr", None, None)
+    request = worker.WorkRequest(
+        len(message.frame),
+        "/tf",
+        worker.view_name(FoxgloveMessage),
+        worker.view_name(TFMessage),
+        arguments=list(message.arguments),
+    )
+    result, parts = worker.answer(request, message.frame)
+    assert len(parts) > 3
+    found = [*offload.values(result, [bytearray(each) for each in parts], TFMessage)]
+    rows = [row for part in found for row in part.rows]
+    assert rows == message.decode(TFMessage).rows
+    assert [names_of(row)[1] for row in rows] == [f"link {n}" for n in range(9000)]
 
 
 @pytest.mark.slow

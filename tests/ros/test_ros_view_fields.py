@@ -13,6 +13,7 @@ import webmap
 from webmap.ros.arrays import Floats, Int8s, Numbers
 from webmap.ros.definitions import FLOATS, INTEGERS, OCTETS, TIMES, shipped
 from webmap.ros.messages import Time
+from webmap.ros.serialized.views import without_none
 
 NAME = re.compile(r"``([a-z0-9_]+/[A-Za-z0-9]+)``")
 WIDTHS = {Floats: ("float32",), Int8s: ("int8",)}
@@ -85,6 +86,7 @@ def fits(hint, field):
 
 
 def fits_one(hint, field):
+    hint = without_none(hint)  # nor a tuple of all values
     if field.fields is not None:
         return not misfits(hint, field.fields)
     return field.type in SCALARS.get(hint, ())

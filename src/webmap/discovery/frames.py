@@ -16,6 +16,7 @@ from webmap.ros.bridge import Bridge
 from webmap.ros.messages import TFMessage
 from webmap.ros.names import is_topic, is_type
 from webmap.ros.temporary_bridge import TemporaryBridge
+from webmap.ros.tf.buffer import names_of
 
 SECONDS = 0.8
 """How long to listen: a robot that moves sends its frames ten times a second."""
@@ -118,8 +119,8 @@ class FrameCollector:
         return self.trees
 
     def _receive(self, namespace: str, message: TFMessage) -> None:
-        for each in message.transforms:
-            self.trees.take(namespace, each.frame_id, each.child_frame_id)
+        for row in message.rows:
+            self.trees.take(namespace, *names_of(row))
 
     def _receive_odometry(self, topic: str, message: _Moved) -> None:
         self.trees.odometry[topic] = message.child_frame_id.strip().strip("/")

@@ -9,14 +9,13 @@ from dataclasses import dataclass
 from functools import partial
 
 from webmap.base.audience import audience
-from webmap.base.errors import ProtocolError
 from webmap.base.scope import Removal, no_scope
 from webmap.poses.placing import ProblemDelay
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import TFMessage
 from webmap.ros.subscriptions import Subscription
-from webmap.ros.tf import Buffer, Transform, TransformError
-from webmap.ros.tf.buffer import LONGEST_NAME
+from webmap.ros.tf import Buffer, TransformError
+from webmap.ros.tf.buffer import LONGEST_NAME, names_of
 
 log = logging.getLogger("webmap.ros.tf")
 
@@ -303,25 +302,21 @@ class Frames:
 
     def _on_message(self, static: bool, message: TFMessage) -> None:
         now = time.monotonic()
-        for each in message.transforms:
-            parent = self.buffer.name(each.frame_id, self.namespace)
-            child = self.buffer.name(each.child_frame_id, self.namespace)
-            move, lasts = each.transform, static
+        for row in message.rows:
+            note, added = None, True
             try:
-                note = self.buffer.add(
-                    parent,
-                    child,
-                    Transform(move.translation.vector, move.rotation.as_sent),
-                    each.stamp,
-                    static=static,
-                )
-                lasts = False
-                self.faults.mend(child)
+                note = self.buffer.add_row(row, static=static, namespace=self.namespace)
             except TransformError as error:
-                note = f"a transform was left out: {error}"
-                parent, child = parent[:LONGEST_NAME], child[:LONGEST_NAME]
-            except ProtocolError as error:  # An error of the stamp; it names no frames.
-                note = f"a transform was left out: {parent!r} -> {child!r}: {error}"
+                note, added = f"a transform was left out: {error}", False
+            if note is None and not self.faults.any:  # nearly always
+                continue
+            parent, child = (
+                self.buffer.name(name, self.namespace)[:LONGEST_NAME]
+                for name in names_of(row)
+            )
+            if added:
+                self.faults.mend(child)
+            lasts = static and not added
             if note and self.faults.note(parent, child, note, now, lasts=lasts):
                 log.warning("%s: %s", self.bridge.name, note)
                 self.wake(KEPT_FOR)

@@ -10,7 +10,7 @@ decoding takes.
 """
 
 import math
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
 import msgspec
 
@@ -385,6 +385,23 @@ class TransformStampedMsg(Stamped, frozen=True, kw_only=True):
     child_frame_id: str
     transform: TransformMsg
 
+    @property
+    def row(self) -> "TransformRow":
+        """The same values without objects."""
+        stamp, move = self.header.stamp, self.transform
+        p, q = move.translation, move.rotation
+        times = stamp.secs, stamp.nsecs, stamp.sec, stamp.nanosec
+        names = self.header.frame_id, self.child_frame_id
+        return (*times, *names, p.x, p.y, p.z, q.x, q.y, q.z, q.w)
+
+
+# fmt: off
+TransformRow: TypeAlias = tuple[
+    int, int, int, int, str, str, float, float, float, float, float, float, float
+]
+# fmt: on
+"""The values of a :class:`TransformStampedMsg`, in the order of its fields."""
+
 
 class TFMessage(msgspec.Struct, frozen=True):
     """``tf2_msgs/TFMessage``."""
@@ -392,7 +409,15 @@ class TFMessage(msgspec.Struct, frozen=True):
     separable: ClassVar = True
     """Whether the parts of a long message may be delivered one after the other."""
 
-    transforms: list[TransformStampedMsg]
+    transforms: list[TransformStampedMsg | TransformRow]
+    """Rows if the message was serialized: six objects for each take twice as long."""
+
+    @property
+    def rows(self) -> list[TransformRow]:
+        """The values of each transform."""
+        return [
+            each if isinstance(each, tuple) else each.row for each in self.transforms
+        ]
 
 
 LOG_LEVELS = ("debug", "info", "warn", "error", "fatal")

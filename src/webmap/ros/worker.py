@@ -163,8 +163,9 @@ def long_list(message: Any) -> str | None:
 def item_type(message: Any, field: str) -> Any:
     """Return the type of the structs in a list of a message; None if there are none."""
     items = get_args(get_type_hints(type(message)).get(field))
-    if items and isinstance(items[0], type) and issubclass(items[0], msgspec.Struct):
-        return items[0]
+    for each in (*items, *(get_args(items[0]) if items else ())):
+        if isinstance(each, type) and issubclass(each, msgspec.Struct):
+            return items[0]
     return None
 
 

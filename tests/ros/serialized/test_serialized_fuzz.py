@@ -9,6 +9,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from serialized_messages import LANGUAGES, TYPES, messages
 
 from webmap.base.errors import ProtocolError
+from webmap.ros.decoding import convert
 from webmap.ros.definitions import shipped
 from webmap.ros.messages import (
     LaserScanMsg,
@@ -56,6 +57,45 @@ def test_a_message_of_an_included_type_is_read_as_it_was_written(encoding, name,
     assert read(written) == message
     assert read(memoryview(bytes(9) + written)[9:]) == message
     assert read(bytearray(written)) == message
+
+
+def outcome(read, data):
+    """Return the transforms in a message as text, or None if it is refused."""
+    with contextlib.suppress(ProtocolError):
+        message = read(data)
+        if isinstance(message, dict):
+            message = convert(message, TFMessage)
+        return repr(message.rows)
+    return None
+
+
+@pytest.mark.parametrize("encoding", LANGUAGES)
+@settings(max_examples=100)
+@given(data=st.data())
+def test_the_transforms_of_a_view_are_those_of_the_plain_message(encoding, data):
+    name = "tf2_msgs/TFMessage"
+    view, write = tools(encoding, name, TFMessage)
+    plain, _ = tools(encoding, name)
+    message = drawn(data, encoding, name)
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for _ in range(3):  # other counts and names, and others in the same bytes
+        order = data.draw(st.permutations(message["transforms"]))
+        more = data.draw(st.sampled_from([[], order[:1], order]))
+        written = bytearray(write({"transforms": [*order, *more]}))
+        if encoding == "cdr" and data.draw(st.booleans()):
+            theirs = store.deserialize_cdr(written, "tf2_msgs/msg/TFMessage")
+            written = bytearray(
+                store.serialize_cdr(
+                    theirs, "tf2_msgs/msg/TFMessage", little_endian=False
+                )
+            )
+        found = outcome(view, bytes(written))
+        assert found is not None
+        assert found == outcome(plain, bytes(written))
+        for _ in range(data.draw(st.integers(1, 4))):
+            at = data.draw(st.integers(0, len(written) - 1))
+            written[at : at + 4] = data.draw(st.binary(min_size=1, max_size=6))
+            assert outcome(view, bytes(written)) == outcome(plain, bytes(written))
 
 
 NUMBERS = [each for each in CODES if each != "byte"]  # rosbags reads it with a sign

@@ -6,7 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Pose, Quaternion, Vector3
+from webmap.ros.messages import Time
 from webmap.ros.tf import (
     Buffer,
     FrameMissing,
@@ -392,3 +394,60 @@ def test_a_frame_without_a_plausible_velocity_is_not_extrapolated(received):
 def test_chain_lists_a_frame_and_all_its_ancestors(robot):
     assert robot.chain("laser") == ["laser", "base_link", "odom", "map"]
     assert robot.chain("nowhere") == ["nowhere"]
+
+
+NUMBERS = st.sampled_from([0.0, 1.0, -2.5, 1e7, 1e200, math.inf, math.nan])
+TURNS = st.sampled_from(
+    [
+        *((0.0, 0.0, 0.0, 1.0), (0.6, 0.0, 0.0, 0.8), (0.0, 0.0, 0.0, 0.0)),
+        *((0.0, 0.0, 0.0, 1.05), (1.0, 1.0, 1.0, 1.0), (math.nan, 0.0, 0.0, 1.0)),
+    ]
+)
+FRAMES = st.sampled_from(["map", "odom", "/odom", "base", "", "n" * 300])
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.tuples(
+                st.sampled_from([0, 10, 100, 10**400]),
+                st.sampled_from([0, 1, 999_999_999, -1, 10**9]),
+                st.sampled_from([0, 11]),
+                st.sampled_from([0, 5]),
+                FRAMES,
+                FRAMES,
+                *[NUMBERS] * 3,
+            ),
+            TURNS,
+            st.sampled_from([False, False, False, True]),
+        ),
+        max_size=30,
+    )
+)
+def test_a_row_of_a_message_is_added_as_its_transform(rows):
+    one, other = Buffer(), Buffer()
+    for values, turn, static in rows:
+        notes = []
+        secs, nsecs, sec, nanosec, parent, child, *place = values
+        try:
+            stamp = Time(secs, nsecs, sec, nanosec).seconds
+        except ProtocolError:
+            with pytest.raises(TransformError, match=r"nanoseconds|digits|name"):
+                one.add_row((*values, *turn), static=static, namespace="/r")
+            continue
+        transform = Transform(Vector3(*place), Quaternion(*turn))
+        options = {"static": static, "namespace": "/r"}
+        given = (parent, child, transform, stamp)
+        for add, arguments in ((one.add_row, [(*values, *turn)]), (other.add, given)):
+            try:
+                notes.append(add(*arguments, **options))
+            except TransformError as error:
+                notes.append(str(error))
+        assert notes[0] == notes[1]
+        assert [*one._tracks] == [*other._tracks]
+    assert one.frames == other.frames
+    for frame, track in one._tracks.items():
+        same = other._tracks[frame]
+        assert (track.parent, track.static) == (same.parent, same.static)
+        assert track._stamps == same._stamps
+        assert track._transforms == same._transforms

@@ -16,7 +16,7 @@ from webmap.ros.bridge import Bridge
 from webmap.ros.messages import Header, TFMessage
 from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.subscriptions import Encoding
-from webmap.ros.tf import Buffer, Transform, TransformError
+from webmap.ros.tf import Buffer, TransformError
 
 ENOUGH = 4
 """Messages after which a topic is unsubscribed: they give three intervals."""
@@ -123,22 +123,14 @@ class FrameCheck:
         buffer = self._buffers.setdefault(namespace, Buffer())
         refused = self._refused.setdefault(namespace, [])
         try:
-            transforms = message.decode(TFMessage).transforms
+            rows = message.decode(TFMessage).rows
         except ProtocolError as error:
             refused.append(f"{message.topic} cannot be read: {error}")
             return
-        for each in transforms:
-            move = each.transform
+        for row in rows:
             try:
-                buffer.add(
-                    each.frame_id,
-                    each.child_frame_id,
-                    Transform(move.translation.vector, move.rotation.as_sent),
-                    each.stamp,
-                    static=name == "tf_static",
-                    namespace=namespace,
-                )
-            except (TransformError, ProtocolError) as error:
+                buffer.add_row(row, static=name == "tf_static", namespace=namespace)
+            except TransformError as error:
                 refused.append(str(error))
 
     def oddities(self, namespace: str) -> tuple[str, ...]:

@@ -28,6 +28,8 @@ from webmap.ros.serialized.schemas import (
 from webmap.ros.serialized.views import (
     Skipped,
     check_view,
+    flattened,
+    is_flat,
     is_row,
     item_of,
     view_fields,
@@ -80,7 +82,7 @@ class Program:
         self._format: list[str] = []
         self._found: list[str] = []
         self._pieces: list[Piece] | None = None
-        self._columns = False
+        self._columns = self._flat = False
         whole = Field("", schema.type, schema.fields)
         if is_row(whole, wanted or Any, encoding):
             result = self._rows(whole, None, wanted or Any)
@@ -234,6 +236,14 @@ class Program:
         """Return the expression of a new struct; positional arguments are faster."""
         first = []
         defaults = {each.name: each.default for each in msgspec.structs.fields(view)}
+        if self._flat:  # the columns of all values in the view
+            for name, default in defaults.items():
+                if name in values:
+                    first.append(values[name])
+                    continue
+                same = map(self._named, flattened(default))
+                first += [f"repeat({each})" for each in same]
+            return ", ".join(first)
         for name in view.__match_args__:
             if not values:
                 break
@@ -294,7 +304,7 @@ class Program:
             self._pieces.append(Piece(is_text=True))
             self._place = ANYWHERE
             value = self._next_value()
-            column = f"map(texts.__getitem__, {value})"
+            column = f"texts.column({value})"
             return self._as(
                 column if self._columns else f"texts[{value}]", hint, hint is str
             )
@@ -400,6 +410,7 @@ class Program:
         pieces: list[Piece] = []
         self._pieces, self._place, offset = pieces, ANYWHERE, self._offset
         self._columns = count is not None and hint is not Any  # slower for a dict
+        self._flat = self._columns and is_flat(hint)
         value = self._value(one, hint)
         self._flush()
         columns, self._columns, self._pieces = self._columns, False, None
@@ -412,6 +423,8 @@ class Program:
             at, unpacked = self._move(at), "u"
             key = f"({count}, n - {at}, {at} & 7)"
             each = f"for {names} in zip(*[iter(u)] * w)"
+            if self._flat:
+                value = f"zip({value})"
             value = f"[*{value}]" if columns else f"[{value} {each}]"
             self._line(f"w = {width}")
         plan = f"{self._named(rows.plan)}(d, {at}, {count or 1}, {key})"
@@ -420,6 +433,7 @@ class Program:
         self._line(f"try: {found} = {value}")
         again = f"f, e = {plan}; {unpacked} = f(d, {at}); {found} = {value}"
         self._line(f"except Misguess: {again}")
+        self._flat = False
         self._move(f"{at} + e")
         return found
 

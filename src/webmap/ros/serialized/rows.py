@@ -17,6 +17,7 @@ MOST_ITEMS = 128
 
 _MOST_TEXTS = 1024
 _LONGEST = 128
+_MOST_BYTES = MOST_ITEMS * _LONGEST
 
 
 class Misguess(ValueError):
@@ -103,6 +104,18 @@ class Texts(dict[bytes, str]):
         super().__init__()
         self._big = big
         self._ends = ends
+        self._columns: dict[tuple[bytes, ...], tuple[str, ...]] = {}
+
+    def column(self, data: tuple[bytes, ...]) -> tuple[str, ...]:
+        """Return the strings of all items; often they are those of a message before."""
+        found = self._columns.get(data)
+        if found is None:
+            found = tuple(map(self.__getitem__, data))
+            if len(data) <= MOST_ITEMS and sum(map(len, data)) <= _MOST_BYTES:
+                if len(self._columns) >= MOST_PLANS:
+                    self._columns.clear()
+                self._columns[data] = found
+        return found
 
     def __missing__(self, data: bytes) -> str:
         length = int.from_bytes(data[:4], "big" if self._big else "little")

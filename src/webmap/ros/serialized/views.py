@@ -67,11 +67,27 @@ def check_view(
 
 
 def without_none(hint: Any) -> Any:
-    """Return the type besides None; a message never has None."""
+    """Return the type besides None, which a message never has, and besides tuples."""
     if isinstance(hint, types.UnionType) or typing.get_origin(hint) is typing.Union:
-        rest = [each for each in typing.get_args(hint) if each is not type(None)]
+        rest = [
+            each
+            for each in typing.get_args(hint)
+            if each is not type(None) and typing.get_origin(each) is not tuple
+        ]
         return rest[0] if len(rest) == 1 else hint
     return hint
+
+
+def is_flat(hint: Any) -> bool:
+    """Return whether a tuple of all values may take the place of a view."""
+    return any(typing.get_origin(each) is tuple for each in typing.get_args(hint))
+
+
+def flattened(value: Any) -> list[Any]:
+    """Return all values of a struct in order, with those of the structs in it."""
+    if not isinstance(value, msgspec.Struct):
+        return [value]
+    return [each for part in msgspec.structs.astuple(value) for each in flattened(part)]
 
 
 def item_of(hint: Any) -> Any:

@@ -7,6 +7,9 @@ from collections import deque
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from webmap.base.errors import ProtocolError
+from webmap.base.geometry import FARTHEST, Quaternion, Vector3
+from webmap.ros.messages import Time, TransformRow
 from webmap.ros.tf.track import Track
 from webmap.ros.tf.transform import (
     FrameMissing,
@@ -34,12 +37,20 @@ MOST_FRAMES = 4096
 LONGEST_NAME = 256
 """Most characters of a frame's name."""
 
+_EXACT = 1e-9
+"""Greatest difference of a quaternion's norm from 1 that is only rounding."""
+
 MOST_COMPARED = 200
 """Frames up to which a name like that of a missing frame is searched."""
 
 _LISTED = 12
 _SENTENCES = 100
 _MOST_PATHS = 1000
+
+
+def names_of(row: TransformRow) -> tuple[str, str]:
+    """Return the names of the parent frame and of the child frame."""
+    return row[4], row[5]
 
 
 class Found(NamedTuple):
@@ -100,6 +111,9 @@ class Buffer:
         """Faults that were handled, in sentences, the newest last."""
         self._tracks: dict[str, Track] = {}
         """By the frame; the first one has had no transform for the longest time."""
+        self._usual: dict[tuple[str, str, str], Track] = {}
+        """The tracks since the tree of frames last changed, by the names in messages
+        and the namespace."""
         self._roots: dict[str, int] = {}
         """The number of child frames of each parent frame."""
         self._missing: dict[str, str] = {}
@@ -153,16 +167,8 @@ class Buffer:
                 can be dropped: static frames and frames with children stay.
 
         """
-        parent, child = self.name(parent, namespace), self.name(child, namespace)
-        longest = max(len(parent), len(child))
-        if longest > LONGEST_NAME:
-            raise TransformError(
-                f"a frame has a name of {longest} characters; the limit is "
-                f"{LONGEST_NAME}: {max(parent, child, key=len)[:40]!r}..."
-            )
+        parent, child = self._full_names(parent, child, namespace)
         names = f"{parent!r} -> {child!r}"
-        if not parent or not child:
-            raise TransformError(f"{names}: a frame has no name")
         try:
             transform = transform.checked()
         except TransformError as error:
@@ -180,6 +186,42 @@ class Buffer:
         track.add(transform, stamp, self.history)
         if note is not None:
             self.notes.append(note)
+        return note
+
+    def add_row(
+        self, row: TransformRow, *, static: bool = False, namespace: str = ""
+    ) -> str | None:
+        """Add one transform of a message; see :meth:`add`.
+
+        Raises:
+            TransformError: As :meth:`add` does; and if the stamp is invalid.
+
+        """
+        secs, nsecs, sec, nanosec, parent, child, x, y, z, qx, qy, qz, qw = row
+        try:
+            stamp = Time(secs, nsecs, sec, nanosec).seconds
+        except ProtocolError as error:
+            parent, child = self._full_names(parent, child, namespace)
+            raise TransformError(f"{parent!r} -> {child!r}: {error}") from None
+        transform = Transform(Vector3(x, y, z), Quaternion(qx, qy, qz, qw))
+        track = self._usual.get((parent, child, namespace))
+        if (  # nearly always; else the same is done by steps that find the reason
+            track is not None
+            and track.static == static
+            and stamp > track.last
+            and abs(math.hypot(qx, qy, qz, qw) - 1.0) < _EXACT
+            and math.hypot(x, y, z) < FARTHEST
+        ):
+            self._tracks[track.frame] = self._tracks.pop(track.frame)
+            track.add(transform, stamp, self.history)
+            return None
+        note = self.add(
+            parent, child, transform, stamp, static=static, namespace=namespace
+        )
+        if len(self._usual) >= MOST_FRAMES:
+            self._usual.clear()
+        known = self._tracks[self.name(child, namespace)]
+        self._usual[parent, child, namespace] = known
         return note
 
     def lookup(
@@ -278,6 +320,19 @@ class Buffer:
         """Return a frame and its ancestors, up to the root."""
         return self._ancestors(self.name(frame))
 
+    def _full_names(self, parent: str, child: str, namespace: str) -> tuple[str, str]:
+        """Return the full names of two frames; TransformError if one is invalid."""
+        parent, child = self.name(parent, namespace), self.name(child, namespace)
+        longest = max(len(parent), len(child))
+        if longest > LONGEST_NAME:
+            raise TransformError(
+                f"a frame has a name of {longest} characters; the limit is "
+                f"{LONGEST_NAME}: {max(parent, child, key=len)[:40]!r}..."
+            )
+        if not parent or not child:
+            raise TransformError(f"{parent!r} -> {child!r}: a frame has no name")
+        return parent, child
+
     def _track(self, parent: str, child: str, static: bool) -> tuple[Track, str | None]:
         """Return the track of a frame, a new one if its parent or kind has changed."""
         track = self._tracks.get(child)
@@ -285,6 +340,7 @@ class Buffer:
             self._tracks[child] = self._tracks.pop(child)
             return track, None
         self._paths.clear()
+        self._usual.clear()
         self._refuse_loop(parent, child)
         if track is None and len(self._tracks) >= MOST_FRAMES:
             self._make_room(parent, child)

@@ -41,6 +41,11 @@ class Track:
         self._transforms: list[Transform] = []
 
     @property
+    def last(self) -> float:
+        """The newest stamp, also of a static transform; -inf if there is none."""
+        return self._stamps[-1] if self._stamps else -math.inf
+
+    @property
     def newest(self) -> float | None:
         """The newest stamp; None if there is none, or the transform is static."""
         return self._stamps[-1] if self._stamps and not self.static else None
