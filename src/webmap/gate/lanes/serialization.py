@@ -86,6 +86,11 @@ class Reader:
         self.numbers("I", 2 if self._cdr else 3)
         return self.text()
 
+    def has(self, size: int) -> bool:
+        """Return whether a number of ``size`` bytes follows."""
+        self._align(size)
+        return self._at + size <= len(self._data)
+
     def _align(self, size: int) -> None:
         if self._cdr:
             self._at += (self._begin - self._at) % size
@@ -191,6 +196,65 @@ def _status(reader: Reader) -> dict[str, Any]:
     id = {"id": reader.text()}
     (status,) = reader.numbers("B")
     return {"goal_id": id, "status": status, "text": reader.text()}
+
+
+def accepted(data: bytes) -> bool:
+    """Return whether an action accepted a goal, by its answer in CDR.
+
+    Raises:
+        ProtocolError: If it is too short or in another form of CDR.
+
+    """
+    return bool(Reader(data, 0, "cdr").numbers("B")[0])
+
+
+def action_feedback(data: bytes, at: int) -> tuple[bytes, dict[str, Any]]:
+    """Return the identifier of a goal and the fields of its feedback that matter.
+
+    Args:
+        data: The bytes that contain a feedback message of ``NavigateToPose``, in CDR.
+        at: Where it begins.
+
+    Raises:
+        ProtocolError: If it is too short or in another form of CDR.
+
+    """
+    reader = Reader(data, at, "cdr")
+    id = bytes(reader.numbers("B", 16))
+    reader.header()
+    reader.numbers("d", 7)  # the pose
+    begun, rest = _duration(reader), _duration(reader)
+    (recoveries,) = reader.numbers("h")
+    (left,) = reader.numbers("f")
+    return id, {
+        "navigation_time": begun,
+        "estimated_time_remaining": rest,
+        "number_of_recoveries": recoveries,
+        "distance_remaining": left,
+    }
+
+
+def _duration(reader: Reader) -> dict[str, Any]:
+    (seconds,), (nanoseconds,) = reader.numbers("i"), reader.numbers("I")
+    return {"sec": seconds, "nanosec": nanoseconds}
+
+
+def action_result(data: bytes) -> tuple[int, dict[str, Any]]:
+    """Return the status of a goal that has ended, and the fields of its result.
+
+    Nav2 has an error code since Iron, and a text since Kilted.
+
+    Raises:
+        ProtocolError: If it is too short or in another form of CDR.
+
+    """
+    reader, fields = Reader(data, 0, "cdr"), {}
+    (status,) = reader.numbers("b")
+    if reader.has(2):
+        fields["error_code"] = reader.numbers("H")[0]
+    if reader.has(4):
+        fields["error_msg"] = reader.text()
+    return status, fields
 
 
 def trigger_result(data: bytes, encoding: Encoding) -> tuple[bool, str]:
