@@ -82,9 +82,7 @@ PARSERS = {
 
 STREAMS = {
     "agents.gate_messages:Order": ("take",),
-    "features.cameras.video_codecs:Av1": ("read",),
     "features.cameras.video_codecs:H264": ("read",),
-    "features.cameras.video_codecs:H265": ("read",),
     "features.cameras.video_codecs:Vp9": ("read",),
     "gate.pipe:Unpacker": ("feed", FromGate),
     "ros.image_pull:HttpResponseParser": ("feed",),
