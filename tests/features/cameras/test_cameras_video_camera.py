@@ -122,7 +122,9 @@ def test_a_codec_that_is_not_supported_is_named(link, robot, camera):
     camera.watch(lambda: None)
     link.publish(TOPIC, message(b"x", format="mpeg4"))
     (text,) = robot.problems.values()
-    assert text.startswith("/camera/video: a video with the codec 'mpeg4'; supported are")
+    assert text.startswith(
+        "/camera/video: a video with the codec 'mpeg4'; supported are"
+    )
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ The packets stay as they are; only their heads are read, in ``video_codecs``.
 """
 
 from webmap.base.errors import ProtocolError
-from webmap.features.cameras.video_codecs import H264, Codec, Picture, Vp9
+from webmap.features.cameras.video_codecs import H264, Picture, Vp9
 from webmap.ros.messages_image import MAX_PIXELS
 
 MOST_BYTES = 2 << 20
@@ -37,7 +37,7 @@ class VideoReader:
         self.note = ""
         """What a viewer should know now: a clause, empty if all is well."""
         self._name = ""
-        self._codec: Codec | None = None
+        self._codec: H264 | Vp9 | None = None
         self._waits_since: float | None = None
         self._starts = False
 
@@ -99,7 +99,7 @@ class VideoReader:
         return picture
 
 
-CODECS: dict[str, type[Codec]] = {"h264": H264, "vp9": Vp9}
+CODECS: dict[str, type[H264] | type[Vp9]] = {"h264": H264, "vp9": Vp9}
 """The codecs by the names of ``foxglove_msgs/CompressedVideo``."""
 
 

@@ -3,7 +3,7 @@
 No I/O, and no picture is decoded. A packet has one picture.
 """
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from webmap.base.errors import ProtocolError
 
@@ -107,17 +107,6 @@ class Picture(NamedTuple):
 
     is_late: bool = False
     """Whether it refers to a later picture."""
-
-
-class Codec(Protocol):
-    """Reads the packets of one video in their order."""
-
-    def read(self, data: bytes) -> Picture | None:
-        """Return the picture in a packet; None if it has parameters only.
-
-        Raises:
-            ProtocolError: If the packet is not valid.
-        """
 
 
 class Sps(NamedTuple):

@@ -107,7 +107,6 @@ class FoxgloveWire:
         self._early: list[bytes] = []
         """What came together with the handshake, before the lane was open."""
         self._encoding: Encoding | None = None
-        self._capabilities: list[str] = []
         self._offered: dict[tuple[str, str], int] = {}
         """The numbers of what the gate publishes, by topic and type."""
         self._channels: dict[int, _Channel] = {}

@@ -103,11 +103,7 @@ class Reader:
 def velocity_in(data: bytes, at: int, type: str, encoding: Encoding) -> Twist | None:
     """Return the velocity in a message, if its type has one and it is finite.
 
-    Args:
-        data: The bytes that contain it.
-        at: Where it begins.
-        type: The type of the message.
-        encoding: Its encoding.
+    The message begins at ``at``.
 
     Raises:
         ProtocolError: If it is too short or in another form of CDR.
@@ -134,8 +130,8 @@ def scan_in(data: bytes, at: int, encoding: Encoding, now: float) -> Scan:
     """Return the scan in a message, folded; a ``refused`` one has no ranges.
 
     Args:
-        data: The bytes that contain it.
-        at: Where it begins.
+        data: The bytes that contain the message.
+        at: Where the message begins.
         encoding: Its encoding.
         now: When it counts as received.
 
@@ -156,16 +152,9 @@ def scan_in(data: bytes, at: int, encoding: Encoding, now: float) -> Scan:
 
 
 def actionlib_in(data: bytes, at: int, type: str, encoding: Encoding) -> Any:
-    """Return the fields of a message about a goal of move_base that matter.
+    """Return the fields that matter of a message about a goal of move_base.
 
-    Args:
-        data: The bytes that contain it.
-        at: Where it begins.
-        type: The type of the message.
-        encoding: Its encoding.
-
-    Returns:
-        ``None`` for another type.
+    The message begins at ``at``. One of another type gives ``None``.
 
     Raises:
         ProtocolError: If it is too short or in another form of CDR.
@@ -211,9 +200,7 @@ def accepted(data: bytes) -> bool:
 def action_feedback(data: bytes, at: int) -> tuple[bytes, dict[str, Any]]:
     """Return the identifier of a goal and the fields of its feedback that matter.
 
-    Args:
-        data: The bytes that contain a feedback message of ``NavigateToPose``, in CDR.
-        at: Where it begins.
+    The message of ``NavigateToPose`` begins at ``at`` and is in CDR.
 
     Raises:
         ProtocolError: If it is too short or in another form of CDR.
