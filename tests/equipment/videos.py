@@ -16,7 +16,6 @@ FILE = Path(__file__).with_suffix(".json")
 FORMATS = {
     "h264": ("avc1.42001f", 16, {"avc": {"format": "annexb"}}),
     "vp9": ("vp09.00.10.08", 4, {}),
-    "av1": ("av01.0.04M.08", 4, {}),
 }
 """The codec, the number of pictures and more for each name of a format."""
 

@@ -266,15 +266,52 @@ class TestStandstill:
         assert old.did(actions.MarkDriven)[-1] == actions.MarkDriven(KEY, False)
 
 
-def test_goals_are_not_sent_to_an_action_through_foxglove():
-    action = spec(bridge_url=URL, goal_topic=None, action="/navigate_to_pose")
-    bench = Bench().begin(action)
-    bench.take()
-    bench.goal()
-    assert "set a goal topic" in bench.refusals()[-1].why
-    assert bench.report().method is None
-    topic = spec(bridge_url=URL, action="/navigate_to_pose")
-    assert Bench().begin(topic).report().method == "topic"
+class TestActions:
+    GO = "/navigate_to_pose"
+
+    def offered(self, bench, *names):
+        bench.handle(events.ActionsOffered(URL, frozenset(names)))
+
+    def test_goals_are_sent_to_an_action_only_where_the_bridge_offers_it(self):
+        bench = Bench().begin(spec(bridge_url=URL, goal_topic=None, action=self.GO))
+        bench.take()
+        bench.goal()
+        why = bench.refusals()[-1].why
+        assert "does not offer /navigate_to_pose as an action" in why
+        assert "include_hidden:=true" in why
+        assert bench.report().method is None
+        self.offered(bench, "/other")
+        assert bench.report().method is None
+        self.offered(bench, "/other", self.GO)
+        assert bench.report().method == "navigate_to_pose"
+        bench.goal()
+        (sent,) = bench.did(actions.SendGoal)
+        assert sent.method == "navigate_to_pose"
+        assert bench.report().goal.method == "navigate_to_pose"
+        bench.handle(events.GoalProgress("r1", sent.id, active=False))
+        assert bench.report().goal.state == "accepted"
+
+    def test_a_lost_link_is_the_reason_before_an_action_that_is_not_offered(self):
+        bench = Bench().begin(spec(bridge_url=URL, goal_topic=None, action=self.GO))
+        bench.take()
+        bench.handle(events.LinkDown(URL, "tasks"))
+        bench.goal()
+        assert "no connection" in bench.refusals()[-1].why
+
+    def test_goals_go_to_a_topic_while_the_action_is_not_offered(self):
+        bench = Bench().begin(spec(bridge_url=URL, action=self.GO))
+        assert bench.report().method == "topic"
+        self.offered(bench, self.GO)
+        assert bench.report().method == "navigate_to_pose"
+        self.offered(bench)
+        assert bench.report().method == "topic"
+
+    def test_a_robot_without_a_velocity_topic_names_what_its_bridge_lacks(self):
+        robot = spec(bridge_url=URL, twist_topic=None, goal_topic=None, action=self.GO)
+        bench = Bench().begin(robot)
+        assert "include_hidden" in bench.report().reason
+        self.offered(bench, self.GO)
+        assert bench.report().reason is None
 
 
 def test_echoes_change_nothing_where_a_ping_proves_more():

@@ -5,6 +5,8 @@ the socket. All later messages on the same socket wait until the goal or call ha
 """
 
 import json
+import os
+import signal
 import subprocess
 import sys
 import threading
@@ -18,6 +20,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from equipment.chromium import watched_tab
+from equipment.foxglove_actions import ABORTED, CANCELED, Navigation
 from equipment.processes import WEB, reset, running
 from equipment.waiting import wait_for
 from webmap.gate.display.client import GateClient
@@ -215,6 +218,36 @@ def test_a_hanging_goal_and_service_call_do_not_delay_the_zero_of_a_stop(folder)
         (goal,) = robot.log.of("send_action_goal")
         links = {received.link for received in robot.log.of("call_service")}
         assert goal.link not in links, "a call on the link of the goal would wait"
+
+
+def test_a_goal_through_foxglove_outlives_a_killed_gate_until_it_is_cancelled(folder):
+    robot = {"action": "/navigate_to_pose", "twist_topic": None}
+    with Navigation() as navigation:
+        navigation.offer()
+        with Page(bridge_url=navigation.url, **robot) as page:
+            page.send_away(1.0, 2.0, 0.0)
+            (first,) = wait_for(lambda: navigation.goals, "the goal")
+            wait_for(
+                lambda: page.reports[-1]["goal"]["state"] == "accepted", "its answer"
+            )
+            os.kill(page.client.pid, signal.SIGKILL)
+            wait_for(
+                lambda: page.reports[-1]["goal"] is None, "a report of the next gate"
+            )
+            wait_for(lambda: page.reports[-1]["armable"], "a robot that can be sent")
+            navigation.feedback(1.5)
+            page.send_away(3.0, 2.0, 0.0)
+            wait_for(lambda: len(navigation.goals) == 2, "the next goal")
+            assert not first.ended.is_set()
+            first.end(ABORTED)
+            navigation.feedback(2.5)
+            wait_for(lambda: page.reports[-1]["goal"]["left"] == 2.5, "its feedback")
+            assert page.reports[-1]["goal"]["state"] == "under way"
+            page.send("stop")
+            wait_for(
+                lambda: page.reports[-1]["goal"]["state"] == "cancelled", "its end"
+            )
+            assert navigation.goals[1].result[0] == CANCELED
 
 
 @pytest.fixture

@@ -50,7 +50,7 @@ PARSERS = {
     "fleet.robot_files:check_picture": (FILE, "image/svg+xml"),
     "fleet.robot_files:picture_from_agent": ("picture.svg",),
     "gate.commands:parse": (),
-    "gate.lanes.foxglove:read_text": (),
+    "gate.lanes.foxglove_texts:read_text": (),
     "gate.lanes.navigation:answer_to": ("call",),
     "gate.lanes.navigation:of_action": ("GOAL",),
     "gate.lanes.navigation:of_topics": ("SPEC", "GOAL"),
@@ -59,6 +59,9 @@ PARSERS = {
     "gate.lanes.rosbridge:plain": (),
     "gate.lanes.scans:check_parts": (),
     "gate.lanes.scans:parse_scan": (1.0,),
+    "gate.lanes.serialization:accepted": (),
+    "gate.lanes.serialization:action_feedback": (0,),
+    "gate.lanes.serialization:action_result": (),
     "gate.lanes.serialization:actionlib_in": (
         0,
         "actionlib_msgs/GoalStatusArray",
@@ -79,9 +82,7 @@ PARSERS = {
 
 STREAMS = {
     "agents.gate_messages:Order": ("take",),
-    "features.cameras.video_codecs:Av1": ("read",),
     "features.cameras.video_codecs:H264": ("read",),
-    "features.cameras.video_codecs:H265": ("read",),
     "features.cameras.video_codecs:Vp9": ("read",),
     "gate.pipe:Unpacker": ("feed", FromGate),
     "ros.image_pull:HttpResponseParser": ("feed",),

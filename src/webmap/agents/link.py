@@ -136,17 +136,7 @@ class AgentConnection(BridgeConnection):
         self._topics: dict[str, ThrottledTopic] = {}
         self._allowance = UserRateLimit("messages", pieces=PIECES, size=BYTES)
 
-    def send(self, frame: bytes) -> None:
-        """Send an operation, now.
-
-        Raises:
-            BridgeClosed: If the connection is not open.
-
-        """
-        if self.state != "open":
-            raise BridgeClosed(
-                f"the connection to {self.url} is not open ({self.state})"
-            )
+    def _send(self, frame: bytes) -> None:
         op = data_messages.read_op(frame)
         if op.op == "subscribe":
             self._listen(op)

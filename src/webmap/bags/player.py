@@ -31,7 +31,6 @@ from webmap.ros.rosbridge.server.graph import (
     Deliver,
     Graph,
     GraphError,
-    ServiceHandler,
 )
 from webmap.ros.rosbridge.server.rosapi import Rosapi
 from webmap.ros.rosbridge.server.schema import Schema
@@ -63,41 +62,10 @@ class ReplayGraph(Graph):
         """Refuse all new publishers and services from now on."""
         self._sealed = True
 
-    def advertise(
-        self,
-        owner: object,
-        name: str,
-        type_name: str,
-        *,
-        node: str = BRIDGE_NODE,
-        latch: bool = False,
-    ) -> None:
-        """Register ``owner`` as publisher of a topic, unless the graph is sealed.
-
-        Raises:
-            GraphError: If the graph is sealed, or as in :meth:`Graph.advertise`.
-
-        """
-        self._refuse()
-        super().advertise(owner, name, type_name, node=node, latch=latch)
-
-    def serve(
-        self,
-        owner: object,
-        name: str,
-        type_name: str,
-        handle: ServiceHandler,
-        *,
-        node: str = BRIDGE_NODE,
-    ) -> None:
-        """Register ``owner`` as the server of a service, unless the graph is sealed.
-
-        Raises:
-            GraphError: If the graph is sealed.
-
-        """
-        self._refuse()
-        super().serve(owner, name, type_name, handle, node=node)
+    def refuse_new(self) -> None:
+        """Refuse a new publisher or service once the graph is sealed."""
+        if self._sealed:
+            raise GraphError(REFUSED)
 
     def subscribe(
         self,
@@ -116,10 +84,6 @@ class ReplayGraph(Graph):
         """
         super().subscribe(owner, name, deliver, type_name, node=node)
         self.subscribed.set()
-
-    def _refuse(self) -> None:
-        if self._sealed:
-            raise GraphError(REFUSED)
 
 
 class Replay:

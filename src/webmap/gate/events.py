@@ -86,6 +86,15 @@ class LinkDown:
 
 
 @dataclass(frozen=True, slots=True)
+class ActionsOffered:
+    """The actions that goals can be sent to at a bridge of Foxglove have changed."""
+
+    url: str
+    actions: frozenset[str]
+    """All of them, by name."""
+
+
+@dataclass(frozen=True, slots=True)
 class PingAnswered:
     """The bridge answered a ping on the control socket."""
 
@@ -300,6 +309,7 @@ class Shutdown:
 Event = (
     LinkUp
     | LinkDown
+    | ActionsOffered
     | PingAnswered
     | TwistWritten
     | GoalWritten

@@ -118,11 +118,13 @@ def test_a_broken_packet_is_a_problem_until_the_next_good_one(link, robot, camer
     assert (got[-2], len(late.pictures)) == ("", 1)
 
 
-def test_a_format_that_no_browser_decodes_is_named(link, robot, camera):
+def test_a_codec_that_is_not_supported_is_named(link, robot, camera):
     camera.watch(lambda: None)
     link.publish(TOPIC, message(b"x", format="mpeg4"))
     (text,) = robot.problems.values()
-    assert text.startswith("/camera/video: a video with the format 'mpeg4'; known are")
+    assert text.startswith(
+        "/camera/video: a video with the codec 'mpeg4'; supported are"
+    )
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import asyncio
 import socket
 
+import foxglove
 import pytest
 
 from equipment.command_line import run_inside
@@ -12,6 +13,8 @@ from webmap.discovery.doctor.measure import observe, tried
 from webmap.ros.foxglove import advice
 from webmap.ros.rosbridge.advice import client_writes, type_not_certain
 from webmap.ros.rosbridge.checks import LinkFacts
+
+FEEDBACK = "int16 number_of_recoveries\nfloat32 distance_remaining\n"
 
 
 def texts(seen):
@@ -45,8 +48,33 @@ def test_a_robot_behind_a_foxglove_bridge_is_examined(kind):
     assert seen.measured["/camera/image/compressed"].count
     assert any("can offer no service" in text for text in found)
     assert "The Foxglove bridge listens on this machine alone." in found
+    options = [finding.advice for finding in found.values() if finding.advice]
+    assert any("include_hidden:=true" in each for each in options) == (kind == "sdk")
     assert not any(finding.level == "wrong" for finding in found.values())
     assert not any("rosbridge" in text or "rosapi" in text for text in found)
+
+
+def test_an_action_of_nav2_is_found_where_the_bridge_offers_it():
+    async def scenario():
+        with sdk_server() as server:
+            feedback = foxglove.Channel(
+                "/navigate_to_pose/_action/feedback",
+                message_encoding="cdr",
+                schema=foxglove.Schema(
+                    name="nav2_msgs/action/NavigateToPose_FeedbackMessage",
+                    encoding="ros2msg",
+                    data=FEEDBACK.encode(),
+                ),
+                context=server.context,
+            )
+            seen = await observe(server.url, seconds=1.0)
+            feedback.close()
+            return seen
+
+    seen = asyncio.run(asyncio.wait_for(scenario(), 60))
+    (robot,) = seen.findings.robots
+    assert robot.action == ("/navigate_to_pose", "nav2_msgs/action/NavigateToPose")
+    assert not any("offers no action" in text for text in texts(seen))
 
 
 def test_a_foxglove_bridge_that_is_not_there():

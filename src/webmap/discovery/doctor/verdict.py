@@ -96,6 +96,10 @@ def _bridge(seen: BridgeFacts) -> Iterator[Finding]:
         yield from _agent(seen)
     elif by_foxglove:
         yield from foxglove_advice.findings(seen.link, seen.url)
+        listed = not seen.unlisted and not seen.topics_given
+        has_actions = any("/_action/" in topic for topic in seen.types)
+        if listed and dialect == "ros2" and not has_actions:
+            yield foxglove_advice.no_actions()
     elif by_rosbridge:
         yield advice.openness(seen.link, seen.url, seen.shown, dialect)
     if not has_gate(seen.url):

@@ -4,7 +4,7 @@ The packets stay as they are; only their heads are read, in ``video_codecs``.
 """
 
 from webmap.base.errors import ProtocolError
-from webmap.features.cameras.video_codecs import H264, H265, Av1, Codec, Picture, Vp9
+from webmap.features.cameras.video_codecs import H264, Picture, Vp9
 from webmap.ros.messages_image import MAX_PIXELS
 
 MOST_BYTES = 2 << 20
@@ -37,7 +37,7 @@ class VideoReader:
         self.note = ""
         """What a viewer should know now: a clause, empty if all is well."""
         self._name = ""
-        self._codec: Codec | None = None
+        self._codec: H264 | Vp9 | None = None
         self._waits_since: float | None = None
         self._starts = False
 
@@ -99,25 +99,24 @@ class VideoReader:
         return picture
 
 
-CODECS: dict[str, type[Codec]] = {"h264": H264, "h265": H265, "vp9": Vp9, "av1": Av1}
+CODECS: dict[str, type[H264] | type[Vp9]] = {"h264": H264, "vp9": Vp9}
 """The codecs by the names of ``foxglove_msgs/CompressedVideo``."""
-
-_SIGNS = (("264", "h264"), ("265", "h265"), ("hevc", "h265"), ("vp9", "vp9"))
 
 
 def codec_name(format: str) -> str:
     """Return the key of :data:`CODECS` for a codec or an encoder of FFmpeg.
 
     Args:
-        format: Such as ``h264``, ``libx264`` or ``hevc_nvenc;yuv420p;bgr8;bgr8``.
+        format: Such as ``h264``, ``libx264`` or ``h264_nvenc;yuv420p;bgr8;bgr8``.
 
     Raises:
-        ProtocolError: If browsers cannot decode it.
+        ProtocolError: If it is another codec.
     """
     first = format.partition(";")[0].strip().lower()
-    for sign, name in (*_SIGNS, ("av1", "av1")):
-        if sign in first:
+    for name in CODECS:
+        if name.removeprefix("h") in first:  # libx264 encodes H.264
             return name
     raise ProtocolError(
-        f"a video with the format {format[:40]!r}; known are {', '.join(CODECS)}"
+        f"a video with the codec {first[:40]!r}; supported are {' and '.join(CODECS)}: "
+        "let the encoder write H.264"
     )

@@ -46,7 +46,7 @@ class VideoCamera(TopicCamera):
         robot: The robot that carries the camera.
         bridge: The bridge of the ROS system that has the topic.
         topic: A topic of type ``foxglove_msgs/CompressedVideo`` or
-            ``ffmpeg_image_transport_msgs/FFMPEGPacket`` with H.264, H.265, VP9 or AV1.
+            ``ffmpeg_image_transport_msgs/FFMPEGPacket`` with H.264 or VP9.
         name: The camera's name, for people.
         type: The type of the topic. If not given, it is ``FFMPEGPacket`` for names that
             end in ``/ffmpeg``, and ``CompressedVideo`` for all others.

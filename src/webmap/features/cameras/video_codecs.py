@@ -3,7 +3,7 @@
 No I/O, and no picture is decoded. A packet has one picture.
 """
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from webmap.base.errors import ProtocolError
 
@@ -107,17 +107,6 @@ class Picture(NamedTuple):
 
     is_late: bool = False
     """Whether it refers to a later picture."""
-
-
-class Codec(Protocol):
-    """Reads the packets of one video in their order."""
-
-    def read(self, data: bytes) -> Picture | None:
-        """Return the picture in a packet; None if it has parameters only.
-
-        Raises:
-            ProtocolError: If the packet is not valid.
-        """
 
 
 class Sps(NamedTuple):
@@ -271,70 +260,6 @@ class H264:
         return Picture(b"".join((*missing, data)), sps.config)
 
 
-class H265:
-    """Reads H.265 in Annex B form; a lost message is not noticed."""
-
-    def __init__(self) -> None:
-        self._parameters: dict[int, bytes] = {}
-        self._config: VideoConfig | None = None
-
-    def read(self, data: bytes) -> Picture | None:
-        """Return the picture in a packet; None if it has parameters only.
-
-        Raises:
-            ProtocolError: If the packet is not valid.
-        """
-        own, kind = set(), None
-        for begin, end in nal_units(data):
-            type = data[begin] >> 1 & 63
-            if type in (32, 33, 34):  # VPS, SPS, PPS
-                own.add(type)
-                if end - begin > MOST_PARAMETERS:
-                    raise ProtocolError(TOO_LONG)
-                self._parameters[type] = START + data[begin:end]
-                if type == 33:
-                    self._config = _h265_config(unescaped(data[begin:end]))
-            elif type < 32 and kind is None:
-                kind = type
-        if kind is None:
-            return None
-        if not 16 <= kind <= 21:  # not a random access point
-            return Picture(data, None)
-        if self._config is None or len(self._parameters) < 3:
-            raise ProtocolError(
-                "a key picture of H.265 without VPS, SPS and PPS: let the encoder "
-                "repeat them in front of each key picture"
-            )
-        missing = [self._parameters[type] for type in (32, 33, 34) if type not in own]
-        return Picture(b"".join((*missing, data)), self._config)
-
-
-def _h265_config(sps: bytes) -> VideoConfig:
-    bits = Bits(sps[2:MOST_READ])
-    bits.take(4)
-    layers = bits.take(3)
-    bits.take(1)
-    space, tier, profile = bits.take(2), bits.take(1), bits.take(5)
-    compatible = int(f"{bits.take(32):032b}"[::-1], 2)
-    constraints = bits.take(48).to_bytes(6, "big").rstrip(b"\0")
-    level = bits.take(8)
-    there = [(bits.take(1), bits.take(1)) for _ in range(layers)]
-    bits.take(2 * (8 - layers) if layers else 0)
-    for has_profile, has_level in there:
-        bits.take(88 * has_profile + 8 * has_level)
-    bits.golomb()
-    if bits.golomb() == 3:
-        bits.take(1)
-    parts = [
-        "hev1",
-        " ABC"[space].strip() + str(profile),
-        f"{compatible:x}",
-        f"{'LH'[tier]}{level}",
-        *(f"{each:x}" for each in constraints),
-    ]
-    return VideoConfig(".".join(parts), bits.golomb(), bits.golomb())
-
-
 class Vp9:
     """Reads VP9, one picture in each packet; a lost message is not noticed."""
 
@@ -364,60 +289,3 @@ class Vp9:
         return Picture(
             data, VideoConfig(f"vp09.{profile:02}.51.{depth:02}", width, height)
         )
-
-
-class Av1:
-    """Reads AV1, one picture in each packet; a lost message is not noticed."""
-
-    def read(self, data: bytes) -> Picture | None:
-        """Return the picture in a packet.
-
-        Raises:
-            ProtocolError: If the packet is not valid.
-        """
-        at, config = 0, None
-        for _ in range(MOST_UNITS):
-            if at >= len(data):
-                break
-            bits = Bits(data[at : at + 10])
-            wrong, type = bits.take(1), bits.take(4)
-            more, has_size, _ = bits.take(1), bits.take(1), bits.take(1)
-            if wrong or not has_size:
-                raise ProtocolError(
-                    "a video packet that is not AV1 in its low overhead format"
-                )
-            at += 1 + more
-            bits.take(8 * more)
-            size = shift = 0
-            while (byte := bits.take(8)) & 128:
-                size, shift, at = size | (byte & 127) << shift, shift + 7, at + 1
-            size, at = size | byte << shift, at + 1
-            if type == 1:
-                config = _av1_config(Bits(data[at : at + min(size, 64)]))
-            at += size
-        if at != len(data) or not data:
-            raise ProtocolError("a video packet of AV1 that is not complete")
-        return Picture(data, config)
-
-
-def _av1_config(bits: Bits) -> VideoConfig:
-    profile, _, reduced = bits.take(3), bits.take(1), bits.take(1)
-    tier = 0
-    if reduced:
-        level = bits.take(5)
-    else:
-        if bits.take(1):
-            raise ProtocolError("a video of AV1 with timing information")
-        delays, points = bits.take(1), 1 + bits.take(5)
-        for number in range(points):
-            bits.take(12)
-            this_level = bits.take(5)
-            this_tier = bits.take(1) if this_level > 7 else 0
-            if delays and bits.take(1):
-                bits.take(4)
-            if number == 0:
-                level, tier = this_level, this_tier
-    wide, high = 1 + bits.take(4), 1 + bits.take(4)
-    width, height = 1 + bits.take(wide), 1 + bits.take(high)
-    codec = f"av01.{profile}.{level:02}{'MH'[tier]}.08"
-    return VideoConfig(codec, width, height)

@@ -10,11 +10,8 @@ publishes and subscribes are its own, and are never used twice.
 
 import contextlib
 import itertools
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple, Unpack
-
-import msgspec
-from msgspec import Struct
 
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Twist
@@ -23,15 +20,17 @@ from webmap.gate.clock import now
 from webmap.gate.events import Scan
 from webmap.gate.lanes import serialization
 from webmap.gate.lanes.calls import Call
-from webmap.gate.lanes.lane import Lane, LaneHandlers
-from webmap.gate.lanes.navigation import (
-    CallResult,
-    GoalNews,
-    because,
-    of_message,
-    readable,
+from webmap.gate.lanes.foxglove_calls import (
+    ENCODINGS,
+    ActionNumbers,
+    FoxgloveCall,
+    FoxgloveGoal,
+    encoding_of,
 )
-from webmap.gate.lanes.rosbridge import EVERY_GOAL
+from webmap.gate.lanes.foxglove_texts import Advertise, Service, Services, read_text
+from webmap.gate.lanes.lane import Lane, LaneHandlers
+from webmap.gate.lanes.navigation import GoalNews, of_message, readable
+from webmap.gate.lanes.rosbridge import EVERY_GOAL, action_fields
 from webmap.gate.lanes.scans import SCAN_THROTTLE, SCAN_TYPE
 from webmap.gate.lanes.serialization import Encoding
 from webmap.gate.lanes.sockets import MAX_FRAME
@@ -43,87 +42,19 @@ PROVING = "foxglove.sdk.v1"
 """The subprotocol of servers that answer a ping after all messages before it."""
 
 MOST_CHANNELS = 20_000
-"""The most channels of a server that are kept."""
+"""The most channels of a server, and the most services of actions, that are kept."""
 
-_ENCODINGS: tuple[Encoding, ...] = ("cdr", "ros1")
+_ACTION = {
+    "send_goal": "nav2_msgs/action/NavigateToPose_SendGoal",
+    "get_result": "nav2_msgs/action/NavigateToPose_GetResult",
+    "cancel_goal": "action_msgs/srv/CancelGoal",
+}
+"""The services of an action that goals are sent to, and their types."""
+
+_FEEDBACK = "nav2_msgs/action/NavigateToPose_FeedbackMessage"
 _SCHEMAS = {"cdr": "ros2msg", "ros1": "ros1msg"}
 _ERROR = 2
 """The level of a status that is an error."""
-
-
-SHORT_TEXT = 1 << 16
-"""The longest text that lists neither topics nor services, in bytes."""
-
-
-class _Op(Struct):
-    op: str
-
-
-class _Offer(Struct, rename="camel"):
-    """What the gate needs of an offered channel; its definition is left out."""
-
-    id: int
-    topic: str
-    encoding: str
-    schema_name: str = ""
-
-
-class _Advertise(Struct):
-    channels: list[_Offer]
-
-
-class _Service(Struct):
-    id: int
-    name: str
-
-
-class _Services(Struct):
-    services: list[_Service]
-
-
-_Text = (
-    _Advertise
-    | _Services
-    | protocol.ServerInfo
-    | protocol.Unadvertise
-    | protocol.Status
-    | protocol.ServiceCallFailure
-)
-_LONG: dict[str, type[_Text]] = {
-    "advertise": _Advertise,
-    "advertiseServices": _Services,
-}
-_SHORT: dict[str, type[_Text]] = {
-    "serverInfo": protocol.ServerInfo,
-    "unadvertise": protocol.Unadvertise,
-    "status": protocol.Status,
-    "serviceCallFailure": protocol.ServiceCallFailure,
-}
-
-
-def read_text(data: bytes) -> _Text | None:
-    """Return an operation of a server, if the gate needs it.
-
-    One invalid part makes it invalid as a whole: to find the valid ones of a million
-    parts takes seconds, in which no other robot gets a zero.
-
-    Raises:
-        ProtocolError: If it is invalid or too long.
-
-    """
-    try:
-        op = msgspec.json.decode(data, type=_Op).op
-        if op in _LONG:
-            return msgspec.json.decode(data, type=_LONG[op])
-        if op not in _SHORT:
-            return None
-        if len(data) > SHORT_TEXT:
-            raise ProtocolError(f"an operation {op} of {len(data)} bytes")
-        return msgspec.json.decode(data, type=_SHORT[op])
-    except (ValueError, RecursionError) as error:  # msgspec's own errors, too
-        raise ProtocolError(
-            f"not Foxglove's protocol: {readable(str(error))}"
-        ) from None
 
 
 class _Channel(NamedTuple):
@@ -134,80 +65,25 @@ class _Channel(NamedTuple):
     encoding: Encoding
 
 
-def _encoding_of(server: protocol.ServerInfo) -> Encoding | None:
-    """Return the encoding for messages of clients, if the gate knows one of them."""
-    known = server.supported_encodings or ()
-    return next((each for each in _ENCODINGS if each in known), None)
-
-
-class FoxgloveCall:
-    """A call at a bridge of Foxglove, which first lists its services.
-
-    Args:
-        service: The service.
-        request: The fields of its request.
-        is_trigger: Whether its answer has a success and a text.
-
-    """
-
-    hello = b""
-
-    def __init__(
-        self, service: str, request: Mapping[str, Any], *, is_trigger: bool = False
-    ) -> None:
-        self._service = service
-        self._request = request
-        self._is_trigger = is_trigger
-        self._encoding: Encoding | None = None
-        self._called = False
-
-    @property
-    def why_silent(self) -> str | None:
-        """That the bridge does not offer the service."""
-        return None if self._called else f"the bridge does not offer {self._service}"
-
-    def read(self, data: bytes) -> bytes | CallResult | None:
-        """Return what to send next, or the result, if a message leads to one."""
-        event = protocol.receive(data) if data[:1] < b" " else read_text(data)
-        match event:
-            case protocol.ServerInfo() as server:
-                self._encoding = _encoding_of(server)
-            case _Services(services) if self._encoding is not None:
-                for each in services:
-                    if each.name == self._service and not self._called:
-                        return self._call(each.id, self._encoding)
-            case protocol.ServiceCallFailure(_, text):
-                return CallResult(because("refused", text))
-            case protocol.ServiceCallResponse() as answer if self._encoding is not None:
-                return self._result(answer.payload, self._encoding)
-        return None
-
-    def _call(self, number: int, encoding: Encoding) -> bytes:
-        self._called = True
-        payload = serialization.serialized(self._request, encoding)
-        if encoding == "cdr" and not self._request:
-            payload += b"\0"  # ROS 2 has no message without a member
-        return protocol.call_service(number, 1, encoding, payload)
-
-    def _result(self, payload: bytes, encoding: Encoding) -> CallResult:
-        if not self._is_trigger:
-            return CallResult(None)
-        success, text = serialization.trigger_result(payload, encoding)
-        return CallResult(
-            None if success else because("the service reported a failure", text)
-        )
-
-
 class FoxgloveWire:
     """How a lane speaks to a bridge of Foxglove.
 
     Args:
         url: The address of the bridge.
+        actions: Called with the actions that goals can be sent to, after each change.
         handlers: The callbacks of the lane.
 
     """
 
-    def __init__(self, url: str, **handlers: Unpack[LaneHandlers]) -> None:
+    def __init__(
+        self,
+        url: str,
+        actions: Callable[[frozenset[str]], None] = lambda _: None,
+        **handlers: Unpack[LaneHandlers],
+    ) -> None:
+        self._on_actions = actions
+        self._actions: frozenset[str] = frozenset()
+        """The actions that were offered last, on this or an earlier connection."""
         self._up, self._down = handlers["up"], handlers["down"]
         self._text = handlers["text"]
         self._numbers = itertools.count(1)
@@ -230,12 +106,13 @@ class FoxgloveWire:
         self._early: list[bytes] = []
         """What came together with the handshake, before the lane was open."""
         self._encoding: Encoding | None = None
-        self._capabilities: list[str] = []
         self._offered: dict[tuple[str, str], int] = {}
         """The numbers of what the gate publishes, by topic and type."""
         self._channels: dict[int, _Channel] = {}
         self._subscribed: dict[int, tuple[int, _Channel]] = {}
         """By the number of the subscription: the server's channel."""
+        self._services: dict[int, tuple[str, str]] = {}
+        """The services of actions, by number: the action and the part of it."""
         self._scanned_at: dict[str, float] = {}
 
     @property
@@ -296,6 +173,26 @@ class FoxgloveWire:
         """
         info = {"goal_id": bytes(16), "sec": 0, "nanosec": 0}
         return FoxgloveCall(f"{action}/_action/cancel_goal", info)
+
+    def action_goal(self, spec: RobotSpec, goal: SendGoal) -> FoxgloveGoal | None:
+        """Return a goal for the robot's action; None if the bridge does not offer it.
+
+        The services are hidden, too.
+        """
+        action = spec.action or ""  # never empty: the rules checked it
+        numbers = {part: n for n, (of, part) in self._services.items() if of == action}
+        if not _ACTION.keys() <= numbers.keys():
+            return None
+        feedback = (
+            number
+            for number, (topic, type, _) in self._channels.items()
+            if topic == f"{action}/_action/feedback" and same_type(type, _FEEDBACK)
+        )
+        found = ActionNumbers(
+            numbers["send_goal"], numbers["get_result"], next(feedback, None)
+        )
+        fields = action_fields(spec, goal)
+        return FoxgloveGoal(goal, fields, found, next(self._numbers))
 
     def read_news(
         self, data: bytes, spec: RobotSpec, goal: SendGoal
@@ -361,12 +258,12 @@ class FoxgloveWire:
         match read_text(data):
             case protocol.ServerInfo() as server:
                 self._greeted(server)
-            case _Advertise(channels):
+            case Advertise(channels):
                 if len(self._channels) + len(channels) > MOST_CHANNELS:
                     self.lane.cut(f"the bridge offers more than {MOST_CHANNELS} topics")
                     return
                 for each in channels:
-                    if each.encoding in _ENCODINGS:
+                    if each.encoding in ENCODINGS:
                         kept = each.topic, each.schema_name, each.encoding
                         self._channels[each.id] = _Channel(*kept)
                 self._match()
@@ -374,11 +271,40 @@ class FoxgloveWire:
                 for id in ids:
                     self._channels.pop(id, None)
                 self._match()
+            case Services(services):
+                self._keep_services(services)
+            case protocol.UnadvertiseServices(ids):
+                for id in ids:
+                    self._services.pop(id, None)
+                self._report_actions()
             case protocol.Status(text, level) if level >= _ERROR:
                 raise ProtocolError(f"the bridge reports an error: {readable(text)}")
 
+    def _keep_services(self, services: Iterable[Service]) -> None:
+        for each in services:
+            action, _, part = each.name.partition("/_action/")
+            if part in _ACTION and same_type(each.type, _ACTION[part]):
+                self._services[each.id] = (action, part)
+        if len(self._services) > MOST_CHANNELS:
+            self.lane.cut(
+                f"the bridge offers more than {MOST_CHANNELS} services of actions"
+            )
+            return
+        self._report_actions()
+
+    def _report_actions(self) -> None:
+        parts: dict[str, set[str]] = {}
+        for action, part in self._services.values():
+            parts.setdefault(action, set()).add(part)
+        found = frozenset(
+            name for name, has in parts.items() if len(has) == len(_ACTION)
+        )
+        if found != self._actions:
+            self._actions = found
+            self._on_actions(found)
+
     def _greeted(self, server: protocol.ServerInfo) -> None:
-        encoding = _encoding_of(server)
+        encoding = encoding_of(server)
         if self._encoding is not None:  # the server asks to forget everything
             self.lane.cut("the bridge has begun a new session")
         elif "clientPublish" not in server.capabilities or encoding is None:

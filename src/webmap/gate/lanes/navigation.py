@@ -122,14 +122,31 @@ def of_action(data: bytes, goal: SendGoal) -> GoalNews | None:
     if frame.id is None or str(frame.id) != goal.id:
         return None
     if frame.op == "action_feedback":
-        feedback = _as(frame.values, _Feedback)
-        return None if feedback is None else _progress(feedback, goal, "")
+        return of_feedback(frame.values, goal)
     if frame.op != "action_result":
         return None
-    outcome = _ROS2.get(frame.status or 0, "failed")
-    if isinstance(frame.values, str):
-        return _ended(goal, outcome, frame.values)
-    result = _as(frame.values, _Result) or _Result()
+    return of_result(frame.status or 0, frame.values, goal)
+
+
+def of_feedback(fields: Any, goal: SendGoal) -> GoalProgress | None:
+    """Return the progress of a goal from the feedback of its action."""
+    feedback = _as(fields, _Feedback)
+    return None if feedback is None else _progress(feedback, goal, "")
+
+
+def of_result(status: int, fields: Any, goal: SendGoal) -> GoalEnded:
+    """Return the end of a goal.
+
+    Args:
+        status: A status of ``action_msgs/GoalStatus``.
+        fields: The fields of the action's result, or the reason as text.
+        goal: The goal.
+
+    """
+    outcome = _ROS2.get(status, "failed")
+    if isinstance(fields, str):
+        return _ended(goal, outcome, fields)
+    result = _as(fields, _Result) or _Result()
     why = result.error_msg
     if not why and result.error_code:
         why = f"error {result.error_code}"

@@ -115,16 +115,21 @@ def goal_message(spec: RobotSpec, goal: SendGoal) -> Message:
     return f"{spec.action}/goal", MOVE_BASE_GOAL, message
 
 
+def action_fields(spec: RobotSpec, goal: SendGoal) -> dict[str, Any]:
+    """Return the fields of a goal of the robot's action."""
+    pose = _stamped("geometry_msgs/msg/PoseStamped", spec, _pose(goal))
+    return {"pose": pose, "behavior_tree": ""}
+
+
 def action_goal(spec: RobotSpec, goal: SendGoal) -> bytes:
     """Return the operation that sends the robot to a goal of its action."""
-    pose = _stamped("geometry_msgs/msg/PoseStamped", spec, _pose(goal))
     return json.dumps(
         {
             "op": "send_action_goal",
             "id": goal.id,
             "action": spec.action,
             "action_type": spec.action_type,
-            "args": {"pose": pose, "behavior_tree": ""},
+            "args": action_fields(spec, goal),
             "feedback": True,
         },
         allow_nan=False,

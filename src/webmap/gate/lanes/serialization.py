@@ -86,6 +86,11 @@ class Reader:
         self.numbers("I", 2 if self._cdr else 3)
         return self.text()
 
+    def has(self, size: int) -> bool:
+        """Return whether a number of ``size`` bytes follows."""
+        self._align(size)
+        return self._at + size <= len(self._data)
+
     def _align(self, size: int) -> None:
         if self._cdr:
             self._at += (self._begin - self._at) % size
@@ -98,11 +103,7 @@ class Reader:
 def velocity_in(data: bytes, at: int, type: str, encoding: Encoding) -> Twist | None:
     """Return the velocity in a message, if its type has one and it is finite.
 
-    Args:
-        data: The bytes that contain it.
-        at: Where it begins.
-        type: The type of the message.
-        encoding: Its encoding.
+    The message begins at ``at``.
 
     Raises:
         ProtocolError: If it is too short or in another form of CDR.
@@ -129,8 +130,8 @@ def scan_in(data: bytes, at: int, encoding: Encoding, now: float) -> Scan:
     """Return the scan in a message, folded; a ``refused`` one has no ranges.
 
     Args:
-        data: The bytes that contain it.
-        at: Where it begins.
+        data: The bytes that contain the message.
+        at: Where the message begins.
         encoding: Its encoding.
         now: When it counts as received.
 
@@ -151,16 +152,9 @@ def scan_in(data: bytes, at: int, encoding: Encoding, now: float) -> Scan:
 
 
 def actionlib_in(data: bytes, at: int, type: str, encoding: Encoding) -> Any:
-    """Return the fields of a message about a goal of move_base that matter.
+    """Return the fields that matter of a message about a goal of move_base.
 
-    Args:
-        data: The bytes that contain it.
-        at: Where it begins.
-        type: The type of the message.
-        encoding: Its encoding.
-
-    Returns:
-        ``None`` for another type.
+    The message begins at ``at``. One of another type gives ``None``.
 
     Raises:
         ProtocolError: If it is too short or in another form of CDR.
@@ -191,6 +185,63 @@ def _status(reader: Reader) -> dict[str, Any]:
     id = {"id": reader.text()}
     (status,) = reader.numbers("B")
     return {"goal_id": id, "status": status, "text": reader.text()}
+
+
+def accepted(data: bytes) -> bool:
+    """Return whether an action accepted a goal, by its answer in CDR.
+
+    Raises:
+        ProtocolError: If it is too short or in another form of CDR.
+
+    """
+    return bool(Reader(data, 0, "cdr").numbers("B")[0])
+
+
+def action_feedback(data: bytes, at: int) -> tuple[bytes, dict[str, Any]]:
+    """Return the identifier of a goal and the fields of its feedback that matter.
+
+    The message of ``NavigateToPose`` begins at ``at`` and is in CDR.
+
+    Raises:
+        ProtocolError: If it is too short or in another form of CDR.
+
+    """
+    reader = Reader(data, at, "cdr")
+    id = bytes(reader.numbers("B", 16))
+    reader.header()
+    reader.numbers("d", 7)  # the pose
+    begun, rest = _duration(reader), _duration(reader)
+    (recoveries,) = reader.numbers("h")
+    (left,) = reader.numbers("f")
+    return id, {
+        "navigation_time": begun,
+        "estimated_time_remaining": rest,
+        "number_of_recoveries": recoveries,
+        "distance_remaining": left,
+    }
+
+
+def _duration(reader: Reader) -> dict[str, Any]:
+    (seconds,), (nanoseconds,) = reader.numbers("i"), reader.numbers("I")
+    return {"sec": seconds, "nanosec": nanoseconds}
+
+
+def action_result(data: bytes) -> tuple[int, dict[str, Any]]:
+    """Return the status of a goal that has ended, and the fields of its result.
+
+    Nav2 has an error code since Iron, and a text since Kilted.
+
+    Raises:
+        ProtocolError: If it is too short or in another form of CDR.
+
+    """
+    reader, fields = Reader(data, 0, "cdr"), {}
+    (status,) = reader.numbers("b")
+    if reader.has(2):
+        fields["error_code"] = reader.numbers("H")[0]
+    if reader.has(4):
+        fields["error_msg"] = reader.text()
+    return status, fields
 
 
 def trigger_result(data: bytes, encoding: Encoding) -> tuple[bool, str]:

@@ -1,6 +1,6 @@
 """The tasks lane: the socket of one bridge for goals, cancels, poses and stop hooks.
 
-Some bridges do nothing else for a socket until the action goal that it sent has ended.
+Some rosbridges do nothing else for a socket until the goal that it sent has ended.
 So an action goal uses up a socket: the lane keeps it for the result and opens another
 for the next messages. For the same reason, and because the handle of an action goal
 belongs to the socket that sent it, :class:`ServiceCalls` calls the cancel service on a
@@ -18,11 +18,20 @@ from typing import TypeVar
 
 from webmap.base.geometry import Pose
 from webmap.gate.actions import SendGoal, SendPose
-from webmap.gate.events import Event, GoalEnded, GoalLost, LinkDown, LinkUp
-from webmap.gate.lanes import navigation, rosbridge
+from webmap.gate.events import (
+    ActionsOffered,
+    Event,
+    GoalEnded,
+    GoalLost,
+    GoalProgress,
+    LinkDown,
+    LinkUp,
+)
+from webmap.gate.lanes import rosbridge
 from webmap.gate.lanes.calls import Ended, ServiceCalls
+from webmap.gate.lanes.navigation import GoalNews
 from webmap.gate.lanes.sockets import Socket, SocketHandlers
-from webmap.gate.lanes.wires import wire_to
+from webmap.gate.lanes.wires import ActionGoal, wire_to
 from webmap.gate.protocol import RobotSpec, StopHook
 from webmap.gate.rules.goals import is_move_base
 
@@ -90,6 +99,7 @@ class TasksLane:
             up=lambda: emit(LinkUp(url, "tasks", self._wire.only_echoes)),
             down=self._down,
             text=self._on_message,
+            actions=lambda actions: emit(ActionsOffered(url, actions)),
         )
         self.lane = self._wire.lane
 
@@ -110,10 +120,7 @@ class TasksLane:
             # First, to miss no message: they may come at once.
             self._follow(spec, goal)
         if goal.method == "navigate_to_pose":
-            data = rosbridge.action_goal(spec, goal)
-            done = self.lane.write(data, only_if_clear=True, until=goal.until)
-            if done:
-                self._keep_for_result(goal)
+            done = self._send_to_action(spec, goal)
         else:
             done = self._publish(rosbridge.goal_message(spec, goal), until=goal.until)
         if not done:
@@ -179,17 +186,29 @@ class TasksLane:
             return self.lane.write(data, only_if_clear=False)
         return self.lane.write(data, only_if_clear=True, until=until)
 
-    def _keep_for_result(self, goal: SendGoal) -> None:
+    def _send_to_action(self, spec: RobotSpec, goal: SendGoal) -> bool:
+        sent = self._wire.action_goal(spec, goal)
+        if sent is None or not self.lane.write(
+            sent.hello, only_if_clear=True, until=goal.until
+        ):
+            return False
+        self._keep_for_result(goal, sent)
+        return True
+
+    def _keep_for_result(self, goal: SendGoal, sent: ActionGoal) -> None:
         throttle = FeedbackThrottle()
 
         # A socket is removed once: one that was closed or lost calls nothing.
         def on_text(data: bytes) -> None:
-            news = navigation.of_action(data, goal)
-            if isinstance(news, GoalEnded):
-                del self._spent[link]
-                link.close()
-            if news is not None and throttle(news):
-                self._emit(news)
+            for found in sent.read(data):
+                if isinstance(found, bytes):
+                    link.send(found)
+                    continue
+                if not isinstance(found, GoalProgress):
+                    del self._spent[link]
+                    link.close()
+                if throttle(found):
+                    self._emit(found)
 
         def lost(why: str) -> None:
             del self._spent[link]
@@ -249,13 +268,15 @@ class FeedbackThrottle:
     def __init__(self) -> None:
         self._at = float("-inf")
 
-    def __call__(self, news: navigation.GoalNews) -> bool:
+    def __call__(self, news: GoalNews | GoalLost) -> bool:
         """Return whether the news should reach the rules."""
         now = asyncio.get_running_loop().time()
-        if isinstance(news, GoalEnded) or now - self._at >= FEEDBACK_PERIOD:
-            self._at = now
+        if not isinstance(news, GoalProgress) or not news.active:
             return True
-        return False
+        if now - self._at < FEEDBACK_PERIOD:
+            return False
+        self._at = now
+        return True
 
 
 def hook_topics(spec: RobotSpec) -> list[Topic]:

@@ -4,13 +4,13 @@ A wire has a lane and fills it with the announcements of one protocol. ``foxglov
 the other one.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Protocol, Unpack
 
 from webmap.base.geometry import Twist
 from webmap.base.identifiers import generate_id
 from webmap.gate.actions import SendGoal
-from webmap.gate.events import Scan
+from webmap.gate.events import GoalLost, Scan
 from webmap.gate.lanes import navigation, rosbridge, scans
 from webmap.gate.lanes.calls import Call, RosbridgeCall
 from webmap.gate.lanes.foxglove import FoxgloveWire
@@ -20,6 +20,41 @@ from webmap.gate.protocol import RobotSpec
 from webmap.ros.names import is_foxglove_url
 from webmap.ros.rosbridge import ops
 from webmap.ros.rosbridge.cbor import looks_like_cbor
+
+
+class ActionGoal(Protocol):
+    """A goal of an action of ROS 2, which has a socket of its own."""
+
+    hello: bytes
+    """The message that sends the goal."""
+
+    def read(self, data: bytes) -> Iterator[bytes | GoalNews | GoalLost]:
+        """Yield what to send next, and the news of the goal, from a message.
+
+        Raises:
+            ProtocolError: If it is invalid in a way that should be logged.
+
+        """
+
+
+class RosbridgeGoal:
+    """A goal of an action at a rosbridge, which answers until the goal has ended.
+
+    Args:
+        spec: The robot.
+        goal: The goal.
+
+    """
+
+    def __init__(self, spec: RobotSpec, goal: SendGoal) -> None:
+        self.hello = rosbridge.action_goal(spec, goal)
+        self._goal = goal
+
+    def read(self, data: bytes) -> Iterator[GoalNews]:
+        """Yield the news of the goal in a message."""
+        news = navigation.of_action(data, self._goal)
+        if news is not None:
+            yield news
 
 
 class Wire(Protocol):
@@ -56,6 +91,9 @@ class Wire(Protocol):
 
     def cancel_call(self, action: str) -> Call:
         """Return the call that cancels every goal of a ROS 2 action."""
+
+    def action_goal(self, spec: RobotSpec, goal: SendGoal) -> ActionGoal | None:
+        """Return a goal for the robot's action of ROS 2; None if it cannot be sent."""
 
     def read_news(
         self, data: bytes, spec: RobotSpec, goal: SendGoal
@@ -142,6 +180,10 @@ class RosbridgeWire:
         id = generate_id()
         return RosbridgeCall(rosbridge.cancel_by_service(action, id), id)
 
+    def action_goal(self, spec: RobotSpec, goal: SendGoal) -> ActionGoal:
+        """Return a goal for the robot's action of ROS 2."""
+        return RosbridgeGoal(spec, goal)
+
     def read_news(
         self, data: bytes, spec: RobotSpec, goal: SendGoal
     ) -> GoalNews | None:
@@ -164,8 +206,20 @@ class RosbridgeWire:
         return scans.parse_scan(data, now)
 
 
-def wire_to(url: str, **handlers: Unpack[LaneHandlers]) -> Wire:
-    """Return the wire for the kind of bridge at an address."""
+def wire_to(
+    url: str,
+    actions: Callable[[frozenset[str]], None] = lambda _: None,
+    **handlers: Unpack[LaneHandlers],
+) -> Wire:
+    """Return the wire for the kind of bridge at an address.
+
+    Args:
+        url: The address.
+        actions: Called with the actions that a bridge of Foxglove offers; a rosbridge
+            does not list them.
+        handlers: The callbacks of the lane.
+
+    """
     if is_foxglove_url(url):
-        return FoxgloveWire(url, **handlers)
+        return FoxgloveWire(url, actions, **handlers)
     return RosbridgeWire(url, **handlers)

@@ -92,9 +92,9 @@ class MotionConditions:
                 return without_proof(self._url)
             return None
         goals = self._robots.goals[self._robots.newest.id]
-        if not goals.can_send:
+        if goals.spec.goal_topic is None and goals.spec.action is None:
             return "the robot has no velocity topic and no goal topic"
-        return None if goals.link.up else "no connection to the bridge that takes goals"
+        return goals.why_not
 
     def why_blocked(self, now: float) -> str | None:
         """Return why the machine must not be driven now, or ``None``."""

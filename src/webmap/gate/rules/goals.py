@@ -91,13 +91,24 @@ class Goals:
         """Whether goals are not sent to the action of ROS 2 but to a topic, if any."""
         spec = self.spec
         if is_foxglove_url(spec.goal_url or spec.bridge_url):
-            return True
+            return spec.action not in self.link.actions
         return self._no_actions and spec.goal_topic is not None
 
     @property
-    def can_send(self) -> bool:
-        """Whether the robot has an action or a topic for goals."""
-        return self.method is not None
+    def why_not(self) -> str | None:
+        """Why goals cannot be sent to the robot, as text, or ``None``."""
+        action = self.spec.action
+        if action is None and self.spec.goal_topic is None:
+            return "no goal topic and no action is set"
+        if not self.link.up:
+            return "no connection to the bridge that takes goals"
+        if self.method is None:
+            return (
+                f"the Foxglove bridge does not offer {action} as an action of type "
+                "NavigateToPose: start it with include_hidden:=true, or set a goal "
+                "topic"
+            )
+        return None
 
     @property
     def can_cancel(self) -> bool:
@@ -149,15 +160,10 @@ class Goals:
             Refusal: If the robot takes no goals, or its link is down.
 
         """
+        if self.why_not is not None:
+            raise Refusal(self.why_not)
         method = self.method
-        if method is None:
-            if self.spec.action is not None:
-                raise Refusal(
-                    "goals are not sent to an action through Foxglove: set a goal topic"
-                )
-            raise Refusal("no goal topic and no action is set")
-        if not self.link.up:
-            raise Refusal("no connection to the bridge that takes goals")
+        assert method is not None  # without one there is a reason
         if self.link.only_echoes and not self.spec.drive_without_proof:
             raise Refusal(without_proof(self.spec.goal_url or self.spec.bridge_url))
         id, until = generate_id(), now + WAIT_LIMIT

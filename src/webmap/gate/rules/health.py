@@ -70,6 +70,8 @@ class LinkHealth:
         """When the newest answer came, or the link was opened."""
         self.only_echoes = False
         """Whether an answer proves only that the connection works, see ``delivery``."""
+        self.actions: frozenset[str] = frozenset()
+        """The actions that a bridge of Foxglove offers, or offered before."""
         self._ping_at = float("-inf")
 
     def opened(self, now: float, *, only_echoes: bool = False) -> None:

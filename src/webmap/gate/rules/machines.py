@@ -92,6 +92,7 @@ class Machines:
             WriterNodes: self._writer_nodes,
             events.LinkUp: self._link_up,
             events.LinkDown: self._link_down,
+            events.ActionsOffered: self._actions_offered,
             events.PingAnswered: self._ping_answered,
             events.TwistWritten: self._twist_written,
             events.GoalWritten: self._goal_written,
@@ -408,6 +409,10 @@ class Machines:
                 machine.link_down(now)
             if not event.spent:
                 machine.active_stop.tasks_down(link, now)
+
+    def _actions_offered(self, event: events.ActionsOffered, now: float) -> None:
+        self._link(event.url, "tasks").actions = event.actions
+        self._at(event.url)
 
     def _ping_answered(self, event: events.PingAnswered, now: float) -> None:
         self._link(event.url, "control").answered(event.asked_at, now)

@@ -19,6 +19,18 @@ def unreachable(trouble: str) -> Finding:
     )
 
 
+def no_actions() -> Finding:
+    """Return the finding that a bridge of ROS 2 offers no action."""
+    return Finding(
+        "note",
+        BRIDGE,
+        "The Foxglove bridge offers no action: goals can be sent to a topic only, "
+        "without progress and result.",
+        "To send goals to Nav2's NavigateToPose and to cancel them, start "
+        "foxglove_bridge with include_hidden:=true.",
+    )
+
+
 def findings(facts: LinkFacts, url: str) -> Iterator[Finding]:
     """Yield the findings about a bridge itself.
 

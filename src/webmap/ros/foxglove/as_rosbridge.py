@@ -88,17 +88,7 @@ class RosbridgeOfFoxglove(BridgeConnection):
             self._closed(CLOSED_HERE)
         self.state = "closed"
 
-    def send(self, frame: bytes) -> None:
-        """Carry out an operation, now.
-
-        Raises:
-            BridgeClosed: If the connection is not open.
-
-        """
-        if self.state != "open":
-            raise BridgeClosed(
-                f"the connection to {self.url} is not open ({self.state})"
-            )
+    def _send(self, frame: bytes) -> None:
         asked = msgspec.json.decode(frame, type=_Operation)
         try:
             self._do(asked)

@@ -51,9 +51,12 @@ class Calls:
         self,
         name: str,
         args: Mapping[str, Any] | Sequence[Any] | None,
+        _type: str | None,
         patience: float,
     ) -> Any:
         """Call a service and return the fields of its response.
+
+        The server offers the service with its type, so none has to be given.
 
         Raises:
             ServiceError: If the server does not offer it, or it fails, or does not

@@ -8,7 +8,7 @@ them. The last two are opened when they are needed.
 import asyncio
 import itertools
 import logging
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,15 +22,13 @@ from webmap.ros.foxglove.graph import FoxgloveGraph
 from webmap.ros.foxglove.messages import Format, format_of, included_text, own_channel
 from webmap.ros.foxglove.session import Session
 from webmap.ros.limits import LIMITS
+from webmap.ros.link import PATIENCE, ReconnectingLink
 from webmap.ros.names import VIDEO, is_type
-from webmap.ros.received_message import BridgeStats, ReceivedMessage
-from webmap.ros.sockets.connection import CLOSED_HERE, BridgeConnection
+from webmap.ros.received_message import ReceivedMessage
+from webmap.ros.sockets.connection import BridgeConnection
 from webmap.ros.subscriptions import Topic
 
 log = logging.getLogger("webmap.ros")
-
-PATIENCE = 5.0
-"""Longest wait for the response to a call, in seconds."""
 
 
 @dataclass(slots=True)
@@ -47,7 +45,7 @@ def _is_large(type: str) -> bool:
     return is_type(type, *LIMITS, *VIDEO)
 
 
-class FoxgloveLink:
+class FoxgloveLink(ReconnectingLink):
     """Topics and services over a Foxglove server; reconnects after each loss.
 
     The server sends every message of a topic: it has no throttle. The bridge decodes
@@ -74,17 +72,7 @@ class FoxgloveLink:
         received: Callable[[Topic, ReceivedMessage], bool],
         report: Callable[[Exception], None],
     ) -> None:
-        self.stats = BridgeStats()
-        self.trouble: str | None = None
-        """Why the connection is not open: the last failed attempt or the last loss."""
-        self.over: str | None = None
-        """Why no connection is opened any more; None if connections are allowed."""
-        self._name = name
-        self._on_open = opened
-        self._on_close = closed
-        self._report = report
-        self._complained = False
-        """Whether the failure of the connection has been logged."""
+        super().__init__(name, opened, closed, report)
         self._timer: asyncio.TimerHandle | None = None
         """When the server must have introduced itself."""
         self._published: dict[str, _Published] = {}
@@ -125,11 +113,6 @@ class FoxgloveLink:
         await self._main.connection.stop()
         await self._large.connection.stop()
         await self._calls.stop()
-
-    def refuse_if_over(self) -> None:
-        """Raise BridgeClosed if no connection is opened any more."""
-        if self.over is not None:
-            raise BridgeClosed(self.over)
 
     def subscribe(self, topic: Topic) -> None:
         """Subscribe to a topic as its listeners need it now."""
@@ -204,29 +187,8 @@ class FoxgloveLink:
         except BridgeError as error:
             self._report(error)
 
-    async def call_service(
-        self,
-        service: str,
-        args: Mapping[str, Any] | Sequence[Any] | None = None,
-        *,
-        type: str | None = None,
-        timeout: float = PATIENCE,
-    ) -> Any:
-        """Call a ROS service on a socket of its own; return the fields of the response.
-
-        Raises:
-            ServiceError: If the service fails or does not respond in time.
-            BridgeClosed: If the connection cannot be opened, or ends before the
-                response.
-
-        """
-        self.refuse_if_over()
-        return await self._calls.call(service, args, timeout)
-
     def _opened(self) -> None:
-        self.stats.links += 1
-        self.trouble, self._complained = None, False
-        log.info("%s: the connection is open", self._name)
+        super()._opened()
         for topic in list(self._main.topics.values()):
             topic.begin_anew()
         loop = asyncio.get_running_loop()
@@ -258,21 +220,11 @@ class FoxgloveLink:
         self._on_open()
 
     def _lost(self, reason: str) -> None:
-        level = logging.INFO if reason == CLOSED_HERE else logging.WARNING
-        log.log(level, "%s: the connection ended: %s", self._name, reason)
-        self.trouble = reason
+        super()._lost(reason)
         self._forget_timer()
         for published in self._published.values():
             published.format = None
         self._on_close(reason)
-
-    def _not_opened(self, error: BridgeClosed) -> None:
-        # Log one line for a bridge that cannot be reached, however long that lasts.
-        level = logging.DEBUG if self._complained else logging.WARNING
-        self._complained = True
-        self.trouble = error.why
-        log.log(level, "%s", error, extra={"source": self._name})
-        self._report(error)
 
     def _open_large(self) -> None:
         """Open the connection for large topics; no effect if it is open already."""

@@ -26,7 +26,7 @@ SUBPROTOCOLS = ("foxglove.sdk.v1", "foxglove.websocket.v1")
 MAX_TEXT = 32 << 20
 """Most bytes of an operation in JSON; 10,000 channels with their schemas have less."""
 
-MESSAGE_DATA, TIME, SERVICE_CALL_RESPONSE, FETCH_ASSET_RESPONSE = 1, 2, 3, 4
+MESSAGE_DATA, TIME, SERVICE_CALL_RESPONSE = 1, 2, 3
 """The opcodes of the server's binary frames."""
 
 _CLIENT_MESSAGE_DATA, _SERVICE_CALL_REQUEST = 1, 2
@@ -34,7 +34,6 @@ _CLIENT_MESSAGE_DATA, _SERVICE_CALL_REQUEST = 1, 2
 _MESSAGE = struct.Struct("<BIQ")
 _TIME = struct.Struct("<BQ")
 _CALL = struct.Struct("<BIII")
-_ASSET = struct.Struct("<BIBI")
 _CLIENT_MESSAGE = struct.Struct("<BI")
 
 PAYLOAD = _MESSAGE.size
@@ -91,8 +90,6 @@ class ServerInfo(Struct, frozen=True, rename="camel"):
     supported_encodings: list[str] | None = None
     """Encodings for messages of clients and for calls of services."""
     metadata: dict[str, str] | None = None
-    session_id: str | None = None
-    """Another value than on the connection before shows that the server is new."""
 
 
 class Status(Struct, frozen=True):
@@ -102,12 +99,6 @@ class Status(Struct, frozen=True):
     level: int = 0
     """0 for information, 1 for a warning, 2 for an error."""
     id: str | None = None
-
-
-class RemoveStatus(Struct, frozen=True, rename="camel"):
-    """Earlier remarks that do not hold any more."""
-
-    status_ids: list[str]
 
 
 class Advertise(Struct, frozen=True):
@@ -169,21 +160,12 @@ class Subscribed(Struct, frozen=True, rename="camel"):
     subscriber_ids: list[str] = []
 
 
-class Provided(Struct, frozen=True, rename="camel"):
-    """The nodes that provide a service, in place of those known before."""
-
-    name: str
-    provider_ids: list[str] = []
-
-
 class ConnectionGraphUpdate(Struct, frozen=True, rename="camel"):
-    """What has changed in the graph of nodes."""
+    """The changes of the graph of nodes that WebMap uses."""
 
     published_topics: list[Published] = []
     subscribed_topics: list[Subscribed] = []
-    advertised_services: list[Provided] = []
     removed_topics: list[str] = []
-    removed_services: list[str] = []
 
 
 class ServiceCallFailure(Struct, frozen=True, rename="camel"):
@@ -191,7 +173,6 @@ class ServiceCallFailure(Struct, frozen=True, rename="camel"):
 
     call_id: int
     message: str = ""
-    service_id: int | None = None
 
 
 class MessageData(Struct, frozen=True):
@@ -218,14 +199,6 @@ class ServiceCallResponse(Struct, frozen=True):
     payload: bytes
 
 
-class FetchAssetResponse(Struct, frozen=True):
-    """A file of the server, or why it cannot be sent."""
-
-    request_id: int
-    error: str | None
-    content: bytes
-
-
 class Unknown(Struct, frozen=True):
     """An operation that this client does not know, such as one of a later server."""
 
@@ -243,7 +216,6 @@ class Malformed(Struct, frozen=True):
 Event: TypeAlias = (
     ServerInfo
     | Status
-    | RemoveStatus
     | Advertise
     | Unadvertise
     | AdvertiseServices
@@ -254,7 +226,6 @@ Event: TypeAlias = (
     | MessageData
     | Time
     | ServiceCallResponse
-    | FetchAssetResponse
     | Unknown
     | Malformed
 )
@@ -285,7 +256,6 @@ class _Service(Struct, rename="camel"):
 _PLAIN: dict[str, type[Any]] = {
     "serverInfo": ServerInfo,
     "status": Status,
-    "removeStatus": RemoveStatus,
     "unadvertise": Unadvertise,
     "unadvertiseServices": UnadvertiseServices,
     "parameterValues": ParameterValues,
@@ -321,8 +291,6 @@ def _read(frame: bytes | bytearray) -> Event:
         return Time(_TIME.unpack_from(frame)[1])
     if code == SERVICE_CALL_RESPONSE:
         return _read_response(frame)
-    if code == FETCH_ASSET_RESPONSE:
-        return _read_asset(frame)
     return Unknown(f"binary operation {code}")
 
 
@@ -380,17 +348,6 @@ def _read_response(frame: bytes | bytearray) -> ServiceCallResponse:
     return ServiceCallResponse(service, call, encoding, bytes(frame[start:]))
 
 
-def _read_asset(frame: bytes | bytearray) -> FetchAssetResponse:
-    _check_length(frame, _ASSET.size, "a fetch asset response")
-    _, request, status, length = _ASSET.unpack_from(frame)
-    start = _ASSET.size + length
-    _check_length(frame, start, "a fetch asset response")
-    if not status:
-        return FetchAssetResponse(request, None, bytes(frame[start:]))
-    error = frame[_ASSET.size : start].decode(errors="replace")
-    return FetchAssetResponse(request, error, b"")
-
-
 def _check_length(frame: bytes | bytearray, least: int, name: str) -> None:
     if len(frame) < least:
         raise ProtocolError(f"{name} of {len(frame)} bytes; expected at least {least}")
@@ -445,11 +402,6 @@ def call_service(service: int, call: int, encoding: str, request: bytes) -> byte
     name = encoding.encode()
     head = _CALL.pack(_SERVICE_CALL_REQUEST, service, call, len(name))
     return head + name + request
-
-
-def get_parameters(names: Iterable[str], id: str) -> bytes:
-    """Return the operation in JSON that asks for parameters; no name asks for all."""
-    return _text("getParameters", parameterNames=list(names), id=id)
 
 
 def set_parameters(parameters: Iterable[Parameter], id: str) -> bytes:

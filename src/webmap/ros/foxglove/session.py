@@ -104,8 +104,6 @@ class Session:
         self.subscribers: dict[str, list[str]] = {}
         self.failure: BridgeClosed | None = None
         """Why the connection is not open, after an attempt or a loss."""
-        self.unanswered = False
-        """Whether a call got no answer in time."""
         self.topics: dict[str, Topic] = {}
         """The topics to subscribe to, as soon as they are offered."""
         self.time: tuple[int, float] | None = None

@@ -6,14 +6,15 @@ listeners and decides what may be published.
 
 import logging
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from webmap.base.errors import BridgeClosed, BridgeError, ProtocolError
+from webmap.base.errors import BridgeError, ProtocolError
 from webmap.base.identifiers import generate_id
 from webmap.base.text import one_line
+from webmap.ros.link import ReconnectingLink
 from webmap.ros.names import split_type
-from webmap.ros.received_message import BridgeStats, ReceivedMessage
+from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.rosbridge import ops
 from webmap.ros.rosbridge.calls import Calls
 from webmap.ros.rosbridge.events import (
@@ -32,13 +33,10 @@ from webmap.ros.rosbridge.wire_subscription import (
     Renewals,
     WireSubscription,
 )
-from webmap.ros.sockets.connection import CLOSED_HERE, BridgeConnection
+from webmap.ros.sockets.connection import BridgeConnection
 from webmap.ros.subscriptions import Topic
 
 log = logging.getLogger("webmap.ros")
-
-PATIENCE = 5.0
-"""Longest wait for an answer about the ROS graph, in seconds."""
 
 
 class _Advertised(NamedTuple):
@@ -46,7 +44,7 @@ class _Advertised(NamedTuple):
     type: str
 
 
-class RosbridgeLink:
+class RosbridgeLink(ReconnectingLink):
     """Topics and services over a rosbridge; reconnects after each loss.
 
     Args:
@@ -73,20 +71,10 @@ class RosbridgeLink:
         received: Callable[[Topic, ReceivedMessage], bool],
         report: Callable[[Exception], None],
     ) -> None:
-        self.stats = BridgeStats()
-        self.trouble: str | None = None
-        """Why the connection is not open: the last failed attempt or the last loss."""
-        self.over: str | None = None
-        """Why no connection is opened any more; None if connections are allowed."""
+        super().__init__(name, opened, closed, report)
         self.graph = BridgeGraph(self.call_service)
         self._url = url
-        self._name = name
-        self._on_open = opened
-        self._on_close = closed
         self._on_message = received
-        self._report = report
-        self._complained = False
-        """Whether the failure of the connection has been logged."""
         self._protocol = Protocol()
         self._calls = Calls(url, self.lane_type)
         self._subscriptions: dict[str, WireSubscription] = {}
@@ -151,25 +139,6 @@ class RosbridgeLink:
         if before is not None:
             self._send(ops.unadvertise(topic, id=before.id))
 
-    async def call_service(
-        self,
-        service: str,
-        args: Mapping[str, Any] | Sequence[Any] | None = None,
-        *,
-        type: str | None = None,
-        timeout: float = PATIENCE,
-    ) -> Any:
-        """Call a ROS service on a socket of its own; return the fields of the response.
-
-        Raises:
-            ServiceError: If the service fails or does not respond in time.
-            BridgeClosed: If the connection cannot be opened, or ends before the
-                response.
-
-        """
-        self.refuse_if_over()
-        return await self._calls.call(service, args, type, timeout)
-
     def _send(self, frame: bytes) -> None:
         """Send a frame if connected; a new connection repeats it anyway."""
         if self.lane.state == "open":
@@ -178,15 +147,8 @@ class RosbridgeLink:
             except BridgeError as error:
                 self._report(error)
 
-    def refuse_if_over(self) -> None:
-        """Raise BridgeClosed if no connection is opened any more."""
-        if self.over is not None:
-            raise BridgeClosed(self.over)
-
     def _opened(self) -> None:
-        self.stats.links += 1
-        self.trouble, self._complained = None, False
-        log.info("%s: the connection is open", self._name)
+        super()._opened()
         self._protocol = Protocol()
         self.graph.forget()
         for topic, each in self._advertised.items():
@@ -198,21 +160,11 @@ class RosbridgeLink:
         self._on_open()
 
     def _lost(self, reason: str) -> None:
-        level = logging.INFO if reason == CLOSED_HERE else logging.WARNING
-        log.log(level, "%s: the connection ended: %s", self._name, reason)
-        self.trouble = reason
+        super()._lost(reason)
         self._renewals.forget()
         for subscription in self._subscriptions.values():
             subscription.link_lost()
         self._on_close(reason)
-
-    def _not_opened(self, error: BridgeClosed) -> None:
-        # Log one line for a bridge that cannot be reached, however long that lasts.
-        level = logging.DEBUG if self._complained else logging.WARNING
-        self._complained = True
-        self.trouble = error.why
-        log.log(level, "%s", error, extra={"source": self._name})
-        self._report(error)
 
     def _received(self, frame: bytes | bytearray) -> None:
         event = self._protocol.receive(frame, time.monotonic())

@@ -108,7 +108,7 @@ class BridgeConnection:
         self.state = "closed"
 
     def send(self, frame: bytes) -> None:
-        """Send ``frame`` now: as text if it is JSON, which begins with a brace.
+        """Send ``frame`` now.
 
         Raises:
             BridgeClosed: If the connection is not open, or accepts no more data.
@@ -120,6 +120,10 @@ class BridgeConnection:
             raise BridgeClosed(
                 f"the connection to {self.url} is not open ({self.state})"
             )
+        self._send(frame)
+
+    def _send(self, frame: bytes) -> None:
+        """Send a frame on an open connection: JSON as text; it begins with a brace."""
         if self._unsent_size + len(frame) > MAX_UNSENT:
             raise BridgeClosed(
                 f"the connection to {self.url} accepts no more data: "

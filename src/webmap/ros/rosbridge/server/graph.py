@@ -96,6 +96,9 @@ class Graph:
         self.services: dict[str, Service] = {}
         self.actions: dict[str, ActionServer] = {}
 
+    def refuse_new(self) -> None:
+        """Raise GraphError if there may be no new publisher and no new service."""
+
     def advertise(
         self,
         owner: object,
@@ -108,9 +111,11 @@ class Graph:
         """Register ``owner`` as publisher of a topic.
 
         Raises:
-            GraphError: If the type is unknown, or the topic has another.
+            GraphError: If the type is unknown, or the topic has another, or no new
+                publisher is allowed.
 
         """
+        self.refuse_new()
         topic = self._topic(name, type_name)
         topic.publishers[owner] = node
         if latch:
@@ -201,7 +206,13 @@ class Graph:
         *,
         node: str = BRIDGE_NODE,
     ) -> None:
-        """Register ``owner`` as the server of a service; the newest server responds."""
+        """Register ``owner`` as the server of a service; the newest server responds.
+
+        Raises:
+            GraphError: If no new service is allowed.
+
+        """
+        self.refuse_new()
         name = resolve(name)
         self.services[name] = Service(name, canonical(type_name), node, owner, handle)
 
