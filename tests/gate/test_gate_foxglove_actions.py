@@ -5,11 +5,12 @@ import math
 import struct
 
 import pytest
-from link_bench import in_loop, until
+from link_bench import in_loop
 from test_gate_foxglove import Server, Tasks, data, response
 
 from equipment.foxglove_actions import ABORTED, SUCCEEDED, Navigation, write
 from equipment.gate_harness import spec
+from equipment.waiting import until
 from webmap.gate.actions import SendGoal
 from webmap.gate.events import (
     ActionsOffered,
