@@ -122,9 +122,14 @@ def test_the_address_of_another_computer_has_one_spelling(url):
     assert names.spellings_of(url) == [url]
 
 
-def test_the_address_of_a_router_with_agents_is_recognised_by_its_scheme():
+def test_the_kind_of_a_link_is_recognised_by_the_scheme_of_its_address():
     assert names.is_agent_url("ZENOHS://hall/bay3")
     assert not names.is_agent_url("wss://hall/zenoh")
+    assert names.is_foxglove_url(" Foxgloves://hall")
+    assert names.is_rosbridge_url("WSS://hall")
+    assert not names.is_rosbridge_url("foxglove://hall")
+    assert names.has_gate("foxglove://hall")
+    assert not names.has_gate("lines://hall")
 
 
 def test_the_agent_in_an_address():

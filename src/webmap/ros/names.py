@@ -119,24 +119,28 @@ def ros2_type(type: str) -> str:
     return f"{package}/msg/{name}"
 
 
+def _scheme(url: str) -> str:
+    return url.partition("://")[0].strip().lower()
+
+
 def is_agent_url(url: str) -> bool:
     """Return whether an address is one of a router with agents, or of an agent."""
-    return url.partition("://")[0].strip().lower() in _AGENTS
+    return _scheme(url) in _AGENTS
 
 
 def has_gate(url: str) -> bool:
     """Return whether a gate can move the robots behind a bridge with this address."""
-    return url.partition("://")[0].strip().lower() in _WITH_GATE
+    return _scheme(url) in _WITH_GATE
 
 
 def is_rosbridge_url(url: str) -> bool:
     """Return whether an address is one of a rosbridge."""
-    return url.partition("://")[0].strip().lower() in _ROSBRIDGE
+    return _scheme(url) in _ROSBRIDGE
 
 
 def is_foxglove_url(url: str) -> bool:
     """Return whether an address is one of a ``foxglove_bridge``."""
-    return url.partition("://")[0].strip().lower() in _FOXGLOVE
+    return _scheme(url) in _FOXGLOVE
 
 
 def web_socket_url(url: str) -> str:
