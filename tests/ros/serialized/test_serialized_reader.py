@@ -313,6 +313,19 @@ def test_messages_whose_strings_change_their_lengths_are_read(encoding):
 
 
 @ENCODINGS
+def test_a_message_with_a_wrong_length_changes_nothing_for_the_next_one(encoding):
+    read, write = tools(encoding, "tf2_msgs/TFMessage")
+    good = write(message_of(encoding, "tf2_msgs/TFMessage"))
+    message = tools(encoding, "tf2_msgs/TFMessage")[0](good)
+    last = good.rfind(b"child_frame_id")
+    wrong = bytearray(good)
+    wrong[last - 4 : last] = (len(good) - last).to_bytes(4, "little")
+    with pytest.raises(ProtocolError):
+        read(bytes(wrong))
+    assert read(good) == message
+
+
+@ENCODINGS
 def test_strings_of_many_messages_are_read(encoding):
     read, write = tools(encoding, "geometry_msgs/PoseStamped", messages.PoseStampedMsg)
     for number in range(3000):

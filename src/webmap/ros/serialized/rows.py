@@ -60,7 +60,7 @@ class Rows:
         self._length = struct.Struct(f"{order}I").unpack_from
 
     def plan(self, data: bytes | memoryview, at: int, count: int, key: Any) -> Plan:
-        """Return the plan of an array, and keep it.
+        """Return the plan of an array, and keep it if the message has so many bytes.
 
         Args:
             data: The message.
@@ -84,7 +84,7 @@ class Rows:
                     codes.append(codes_of)
                 at += size
         plan = struct.Struct("".join(codes)).unpack_from, at - start
-        if count <= MOST_ITEMS:
+        if count <= MOST_ITEMS and at <= len(data):
             if len(self.plans) >= MOST_PLANS:
                 self.plans.clear()
             self.plans[key] = plan
