@@ -97,4 +97,4 @@ def test_invalid_arguments_of_a_map_module_give_one_notice(map, robot, channel):
     robot.add_module("OnMaps", "TileLayer", "/none", (50.0, 14.0), most=0)
     map.add_robot(robot)
     (error,) = channel.errors
-    assert "Bob: TileLayer: most is a number of tiles" in error
+    assert "Bob: TileLayer: the tiles: most: got the whole number 0" in error

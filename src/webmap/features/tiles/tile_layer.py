@@ -84,7 +84,7 @@ class TileLayer:
             )
         options = {"tile_size": tile_size, "most": most, "opacity": opacity}
         for key, value in options.items():
-            read_key(TilesConfig, key, value, "TileLayer")
+            read_key(TilesConfig, key, value, "the tiles")
         plane = LocalPlane(*datum, east)
         self.map = map
         self.source = open_tiles(source)
