@@ -63,7 +63,7 @@ class TestFold:
         assert folded(sweep) is sweep
 
     @given(st.integers(721, LIMIT))
-    @settings(max_examples=20, deadline=None)
+    @settings(max_examples=10, deadline=None)
     def test_a_folded_scan_has_at_most_720_beams(self, count):
         fold = folded(dense(array("f", [2.0]) * count))
         assert MOST / 2 <= len(fold.ranges) <= MOST
@@ -71,7 +71,7 @@ class TestFold:
         assert sum(fold.fold.total) == count
 
     @given(PROFILES, COUNTS, st.integers(0, 99), st.sampled_from([1.0, -1.0]))
-    @settings(max_examples=40, deadline=None)
+    @settings(max_examples=15, deadline=None)
     def test_folding_keeps_every_hit_at_its_distance_or_nearer(
         self, profile, count, seed, way
     ):
@@ -88,7 +88,7 @@ class TestFold:
                 assert rest == 0 or fold.ranges[low + 1] <= reach
 
     @given(PROFILES, COUNTS, st.integers(0, 99))
-    @settings(max_examples=40, deadline=None)
+    @settings(max_examples=15, deadline=None)
     def test_folding_adds_no_hits(self, profile, count, seed):
         """Each folded range is the range of a beam less than a step away."""
         sweep = dense(spread(profile, count, seed))
@@ -187,7 +187,7 @@ class TestVerdict:
         stop=st.floats(0.0, 0.5),
         brake=st.floats(0.1, 5.0),
     )
-    @settings(max_examples=40, deadline=None)
+    @settings(max_examples=15, deadline=None)
     def test_leaving_out_distant_points_changes_no_verdict(
         self, profile, count, seed, footprint, sensor, twist, stop, brake
     ):

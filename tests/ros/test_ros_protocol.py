@@ -330,13 +330,13 @@ operations = st.fixed_dictionaries(
 
 
 @given(st.binary(max_size=200))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_any_bytes_give_a_valid_or_a_malformed_event(frame):
     try_all(frame)
 
 
 @given(st.binary(max_size=200))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_any_bytes_after_a_good_head_give_a_value_or_a_protocol_error(tail):
     try_all(b'{"op":"publish","topic":"/a","msg":' + tail)
     try_all(b"\xa3bopgpublishetopicb/acmsg" + tail)
@@ -344,7 +344,7 @@ def test_any_bytes_after_a_good_head_give_a_value_or_a_protocol_error(tail):
 
 @pytest.mark.slow
 @given(operations)
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_any_operation_gives_a_valid_or_a_malformed_event(operation):
     import cbor2
 
@@ -353,7 +353,7 @@ def test_any_operation_gives_a_valid_or_a_malformed_event(operation):
 
 
 @given(st.data())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_a_captured_message_with_a_changed_byte_raises_only_protocol_errors(data):
     path = data.draw(st.sampled_from([p.values[0] for p in files("cbor_[bo]*.bin")]))
     frame = bytearray(path.read_bytes())
