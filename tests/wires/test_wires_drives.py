@@ -1,6 +1,7 @@
 """Scripted drives send the recorded messages over pipe, sockets and bridges."""
 
 import json
+import os
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -35,6 +36,7 @@ def played_by_one(folder, names):
     mode = "write" if WRITES else "compare"
     done = subprocess.run(
         [sys.executable, PROGRAM, result, mode, *names],
+        env=os.environ | {"PYTHONPATH": str(PROGRAM.parents[1])},
         capture_output=True,
         text=True,
         timeout=200,

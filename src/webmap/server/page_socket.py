@@ -82,6 +82,10 @@ OPENS = 2.0
 OPENS_AT_ONCE = 30
 """Pages that one viewer may open at once, if not more have a place."""
 
+REFUSAL_S = 1.0
+"""How long a socket that comes too soon, or is one too many, waits for its refusal, in
+seconds. A page that connects again after each refusal then costs little."""
+
 MOST_VIEWERS = 1024
 """Viewers whose new pages are counted; who opened one longest ago is forgotten."""
 
@@ -203,6 +207,8 @@ class PageSocket:
 
     async def refuse(self, code: int, reason: str) -> None:
         """Close the socket with a reason before any message was passed."""
+        if code == COME_BACK:
+            await asyncio.sleep(REFUSAL_S)
         self._end(code, reason)
         await self._send_close()
 
