@@ -185,6 +185,7 @@ def walk_all(walker: Walker) -> None:
     assert walker.tabbed > 300
 
 
+@pytest.mark.timeout(300)
 @pytest.mark.parametrize("walk", [walk_beside_a_robot, walk_all], ids=["one", "all"])
 def test_space_is_stop_at_every_element_of_every_state(open_console, walk):
     walker = Walker(open_console())
