@@ -134,7 +134,7 @@ async def listen(link: str, url: str, meter: Meter) -> Times:
 
 async def listen_bare(link: str, url: str, meter: Meter) -> Times:
     """Receive the same frames with websockets alone."""
-    found: list[tuple[float, bytes]] = []
+    found: list[tuple[float, Any]] = []
     topics: dict[int, str] = {}
 
     async def receive() -> None:
