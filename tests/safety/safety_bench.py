@@ -40,15 +40,16 @@ RESET = """import("/_webmap/web/access.js")
     const url = new URL("/_webmap/drive", location.href);
     url.protocol = "ws:";
     const socket = new WebSocket(url, protocols());
-    const stopped = new Set();
+    const { robot: driven } = document.querySelector(".robot.selected").dataset;
+    let stopped = false;
     socket.onmessage = (event) => {
         const message = JSON.parse(event.data);
         if (message.op !== "robot") return;
         if (message.latched) {
             const { robot, stop } = message;
-            stopped.add(robot);
+            stopped ||= robot === driven;
             socket.send(JSON.stringify({ op: "reset", robot, stop: stop.id }));
-        } else if (stopped.has(message.robot)) {
+        } else if (stopped && message.robot === driven) {
             socket.close();
             done(message.state);
         }
@@ -205,7 +206,10 @@ class Bench:
         )
 
     def reset_stop(self):
-        """End the STOP, like the reset button, but over a second socket of the page."""
+        """End the STOP, like the reset button, but over a second socket of the page.
+
+        After STOP ALL other robots are reset too, until the selected robot is free.
+        """
         self.tab.wait("document.body.innerText.includes('STOP active')")
         assert self.tab.evaluate(RESET) in {"free", "held", "stopping"}
 
