@@ -164,16 +164,31 @@ function ownPart(url) {
   return PART_FOLDERS.some((folder) => name.startsWith(folder)) ? name : null;
 }
 
+/** @type {Map<string, Promise<any>>} The bundles that were requested, by their address. */
+const bundles = new Map();
+
 /**
  * Load WebMap's own part of this name, with the others of its bundle.
  *
+ * All parts wait for one import, so that they are attached together: with an import for
+ * each, the browser computed styles and painted between them.
+ *
  * @param {string} name
+ * @param {(url: string) => Promise<any>} [load]
+ * @returns {Promise<any>}
  */
-async function partOf(name) {
-  const bundle = new URL(FIRST.get(name) ?? PARTS, OWN_FILES);
-  const { $modules } = await importOf(bundle.href);
-  if (!$modules[name]) throw new Error("WebMap has no such module");
-  return $modules[name];
+export async function partOf(name, load = importOf) {
+  const { href } = new URL(FIRST.get(name) ?? PARTS, OWN_FILES);
+  const loading = bundles.get(href) ?? load(href);
+  bundles.set(href, loading);
+  try {
+    const { $modules } = await loading;
+    if (!$modules[name]) throw new Error("WebMap has no such module");
+    return $modules[name];
+  } catch (error) {
+    bundles.delete(href);
+    throw error;
+  }
 }
 
 /** @param {string | null} url */
