@@ -12,6 +12,7 @@ import pytest
 from console_ready import wait_until_ready
 from playwright.sync_api import Browser, Page, Route
 
+from equipment.waiting import wait_for
 from webmap.server.bundles import FIRST_SHEETS, PART_SHEETS, PARTS, STARTS
 from webmap.server.own_files import own_files
 
@@ -232,3 +233,23 @@ def test_all_that_is_loaded_is_compressed_and_never_asked_for_again(
 def test_a_page_that_is_loaded_again_asks_for_its_html_only(opened: Opened) -> None:
     asked = [one.path for one in opened.again.answers.values() if not one.stored]
     assert asked == ["/"]
+
+
+PARTS_STYLE = f"""() => [...document.querySelectorAll("link[rel=stylesheet]")]
+  .filter(({{ href, sheet }}) => sheet && href.endsWith("/{PART_SHEETS}"))
+  .map(({{ media }}) => media)"""
+"""The media of the style sheet of the parts, once it is loaded."""
+
+
+def test_the_styles_of_parts_apply_together_with_the_parts(demo, chromium) -> None:
+    context = chromium.new_context(viewport={"width": 1280, "height": 800})
+    page = context.new_page()
+    held: list[Route] = []
+    page.route(re.compile(rf"/{PARTS}$"), lambda route: held.append(route))
+    page.goto(demo.url)
+    wait_for(lambda: page.evaluate(PARTS_STYLE) == ["not all"], "the sheet", 30.0, page)
+    wait_for(lambda: held, "the request of the parts", 30.0, page)
+    held[0].continue_()
+    wait_until_ready(page)
+    assert page.evaluate(PARTS_STYLE) == ["all"]
+    context.close()

@@ -32,6 +32,9 @@ const FIRST = new Map(Object.entries(FIRST_PARTS));
 /** Milliseconds for which the other parts wait for STOP and driving. */
 const FIRST_PATIENCE = 1000;
 
+/** The media of a style sheet that is loaded and does not apply yet. */
+const WAITS = "not all";
+
 /** Loads, attaches and detaches the browser parts of modules. */
 export class BrowserParts {
   /** @param {BrowserPartsPage} page */
@@ -63,10 +66,12 @@ export class BrowserParts {
     const part = ownPart(url);
     const first = part !== null && FIRST.has(part);
     const sheet = first ? FIRST_SHEETS : PART_SHEETS;
-    const style = css ? this._addStyle(part ? sheet : css) : null;
+    const style = css ? this._addStyle(part ? sheet : css, first) : null;
     const load = () => {
       if (style) style.link.href = style.url;
-      const code = part ? partOf(part) : moduleOf(url);
+      const code = (part ? partOf(part) : moduleOf(url)).finally(() => {
+        if (style) this._apply(style.link);
+      });
       return this._load(attached, instance, code, options).catch((error) => {
         // Not every browser loads a failed import of a module again.
         const hint = error instanceof TypeError ? " Reload the page to try again." : "";
@@ -138,17 +143,33 @@ export class BrowserParts {
   }
 
   /**
+   * Apply a style sheet together with its parts: applied before, the browser would
+   * compute the styles of the page once more.
+   *
+   * @param {HTMLLinkElement} link
+   */
+  _apply(link) {
+    if (link.media !== WAITS) return;
+    link.media = "all";
+    if (link.sheet) this._page.onStyles();
+  }
+
+  /**
    * @param {string} css
+   * @param {boolean} first Whether it is of STOP and driving, and applies at once.
    * @returns {{link: HTMLLinkElement, url: string} | null} In the order of the modules;
    *     null if there is nothing to load.
    */
-  _addStyle(css) {
+  _addStyle(css, first) {
     const url = resolve(css, OWN_FILES);
     if (url === null || this._styles.has(url)) return null;
     this._styles.add(url);
     const link = document.createElement("link");
     link.rel = "stylesheet";
-    link.addEventListener("load", () => this._page.onStyles());
+    if (!first) link.media = WAITS;
+    link.addEventListener("load", () => {
+      if (link.media !== WAITS) this._page.onStyles();
+    });
     document.head.append(link);
     return { link, url };
   }
