@@ -13,7 +13,7 @@ from console_ready import wait_until_ready
 from playwright.sync_api import Browser, Page, Route
 
 from equipment.waiting import wait_for
-from webmap.server.bundles import FIRST_SHEETS, PART_SHEETS, PARTS, STARTS
+from webmap.server.bundles import FIRST_SHEETS, LATER, PART_SHEETS, PARTS, STARTS
 from webmap.server.own_files import own_files
 
 pytestmark = pytest.mark.browser
@@ -213,6 +213,13 @@ def test_the_whole_console_loads_each_file_once(opened: Opened) -> None:
     assert len(answers) <= MOST_REQUESTS_IN_ALL
     loaded = [one.url for one in answers if not one.stored]
     assert len(loaded) == len(set(loaded))
+
+
+def test_what_is_imported_when_it_is_used_is_not_loaded_before(opened: Opened) -> None:
+    paths = [one.path for one in opened.loading.answers.values()]
+    files = f"/_webmap/v-{own_files.version()}/"
+    assert files + PARTS in paths
+    assert files + LATER not in paths
 
 
 def test_all_that_is_loaded_is_compressed_and_never_asked_for_again(

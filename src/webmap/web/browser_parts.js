@@ -1,5 +1,13 @@
 import { OWN_FILES, resolve } from "./access.js";
-import { FIRST_PARTS, FIRST_SHEETS, PARTS, PART_FOLDERS, PART_SHEETS } from "./constants.js";
+import {
+  FIRST_PARTS,
+  FIRST_SHEETS,
+  LATER,
+  LATER_PARTS,
+  PARTS,
+  PART_FOLDERS,
+  PART_SHEETS,
+} from "./constants.js";
 
 /** @typedef {import('./map.js').MapCanvas} MapCanvas */
 
@@ -191,15 +199,37 @@ const bundles = new Map();
 /**
  * Load WebMap's own part of this name, with the others of its bundle.
  *
- * All parts wait for one import, so that they are attached together: with an import for
- * each, the browser computed styles and painted between them.
- *
  * @param {string} name
  * @param {(url: string) => Promise<any>} [load]
  * @returns {Promise<any>}
  */
 export async function partOf(name, load = importOf) {
-  const { href } = new URL(FIRST.get(name) ?? PARTS, OWN_FILES);
+  const bundle = FIRST.get(name) ?? (LATER_PARTS.includes(name) ? LATER : PARTS);
+  return moduleIn(bundle, name, load);
+}
+
+/**
+ * Load a module that another one imports when somebody uses it: the server replaces
+ * `import("./x.js")` by a call of this function.
+ *
+ * @param {string} name
+ * @returns {Promise<any>}
+ */
+export async function laterModule(name) {
+  return moduleIn(LATER, name, importOf);
+}
+
+/**
+ * All that wait for a bundle share one import, so that parts are attached together: with
+ * an import for each, the browser computed styles and painted between them.
+ *
+ * @param {string} bundle
+ * @param {string} name
+ * @param {(url: string) => Promise<any>} load
+ * @returns {Promise<any>}
+ */
+async function moduleIn(bundle, name, load) {
+  const { href } = new URL(bundle, OWN_FILES);
   const loading = bundles.get(href) ?? load(href);
   bundles.set(href, loading);
   try {
