@@ -22,6 +22,8 @@ from webmap.server.access import CODE, KEY, PROTOCOL
 from webmap.server.bundles import (
     FIRST_PARTS,
     FIRST_SHEETS,
+    LATER,
+    LATER_PARTS,
     PART_FOLDERS,
     PART_SHEETS,
     PARTS,
@@ -62,6 +64,8 @@ def constants_js() -> str:
     constants = {
         "FOLDER": (FOLDER, "The path of WebMap's own files and sockets on the server."),
         "PARTS": (PARTS, "The bundle with WebMap's other browser parts."),
+        "LATER": (LATER, "The bundle of what is loaded when somebody uses it."),
+        "LATER_PARTS": (list(LATER_PARTS), "The browser parts of this bundle."),
         "PART_FOLDERS": (list(PART_FOLDERS), "Where their own modules are."),
         "FIRST_PARTS": (
             FIRST_PARTS,

@@ -12,7 +12,8 @@ import pytest
 from console_ready import wait_until_ready
 from playwright.sync_api import Browser, Page, Route
 
-from webmap.server.bundles import FIRST_SHEETS, PART_SHEETS, PARTS, STARTS
+from equipment.waiting import wait_for
+from webmap.server.bundles import FIRST_SHEETS, LATER, PART_SHEETS, PARTS, STARTS
 from webmap.server.own_files import own_files
 
 pytestmark = pytest.mark.browser
@@ -214,6 +215,13 @@ def test_the_whole_console_loads_each_file_once(opened: Opened) -> None:
     assert len(loaded) == len(set(loaded))
 
 
+def test_what_is_imported_when_it_is_used_is_not_loaded_before(opened: Opened) -> None:
+    paths = [one.path for one in opened.loading.answers.values()]
+    files = f"/_webmap/v-{own_files.version()}/"
+    assert files + PARTS in paths
+    assert files + LATER not in paths
+
+
 def test_all_that_is_loaded_is_compressed_and_never_asked_for_again(
     opened: Opened,
 ) -> None:
@@ -232,3 +240,23 @@ def test_all_that_is_loaded_is_compressed_and_never_asked_for_again(
 def test_a_page_that_is_loaded_again_asks_for_its_html_only(opened: Opened) -> None:
     asked = [one.path for one in opened.again.answers.values() if not one.stored]
     assert asked == ["/"]
+
+
+PARTS_STYLE = f"""() => [...document.querySelectorAll("link[rel=stylesheet]")]
+  .filter(({{ href, sheet }}) => sheet && href.endsWith("/{PART_SHEETS}"))
+  .map(({{ media }}) => media)"""
+"""The media of the style sheet of the parts, once it is loaded."""
+
+
+def test_the_styles_of_parts_apply_together_with_the_parts(demo, chromium) -> None:
+    context = chromium.new_context(viewport={"width": 1280, "height": 800})
+    page = context.new_page()
+    held: list[Route] = []
+    page.route(re.compile(rf"/{PARTS}$"), lambda route: held.append(route))
+    page.goto(demo.url)
+    wait_for(lambda: page.evaluate(PARTS_STYLE) == ["not all"], "the sheet", 30.0, page)
+    wait_for(lambda: held, "the request of the parts", 30.0, page)
+    held[0].continue_()
+    wait_until_ready(page)
+    assert page.evaluate(PARTS_STYLE) == ["all"]
+    context.close()

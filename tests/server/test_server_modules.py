@@ -13,6 +13,8 @@ from webmap.server.bundles import (
     EAGER,
     FIRST_PARTS,
     FIRST_SHEETS,
+    LATER,
+    LATER_PARTS,
     PART_FOLDERS,
     PART_SHEETS,
     PARTS,
@@ -94,7 +96,7 @@ def test_each_module_of_webmap_is_served_once_and_a_page_starts_with_few():
 
 def test_chromium_compiles_whole_bundles_beside_the_main_thread():
     served = served_modules(own_files(".js"))
-    for name in (*STARTS, PARTS):
+    for name in (*STARTS, PARTS, LATER):
         assert served[name].startswith("//# allFunctionsCalledOnLoad\n"), name
     assert not served["web/tools/elements.js"].startswith(EAGER)
 
@@ -124,7 +126,9 @@ def test_a_source_map_has_the_source_of_each_line():
             written, start = source.split("\n"), section["offset"]["line"]
             assert len(section["map"]["mappings"].split(";")) == len(written)
             for line, served_line in zip(written, lines[start:], strict=False):
-                changed = re.match(r"import |export |  \w+( as \w+)?,$|} from ", line)
+                changed = re.search(
+                    r"^(import |export |  \w+( as \w+)?,$|} from )| import\(", line
+                )
                 assert served_line in ("", line, line.lstrip()) or changed, (
                     origin,
                     line,
@@ -142,7 +146,11 @@ FEW = {
     "export default function attach() {}\n",
     "x/own.js": 'import {\n  a,\n  b as c,\n} from "../both.js";\n'
     "// Own.\nexport class own {}\n",
-    "x/two.js": 'import { tool } from "../tool.js";\nexport default class Two {}\n',
+    "x/two.js": 'import { tool } from "../tool.js";\nexport default class Two {\n'
+    '  later() {\n    return import("./used.js");\n  }\n}\n',
+    "x/used.js": 'import { tool } from "../tool.js";\n'
+    'import { own } from "./only.js";\nexport class Used {}\n',
+    "x/only.js": "export const own = 3;\n",
     "tool.js": "export async function tool() {}\n",
 }
 
@@ -165,11 +173,41 @@ def test_modules_that_a_page_does_not_start_with_are_served_as_one():
         "function attach() {}\n"
         "\nreturn { default: attach };\n})();\n"
         '$modules["x/two.js"] ??= (() => {\n'
-        'const { tool } = $modules["tool.js"];\nclass Two {}\n'
+        'const { tool } = $modules["tool.js"];\nclass Two {\nlater() {\n'
+        'return $modules["web/browser_parts.js"].laterModule("x/used.js");\n}\n}\n'
         "\nreturn { default: Two };\n})();\n"
         "export { $modules };\n"
         "//# sourceMappingURL=parts.js.map\n"
     )
+
+
+def test_what_is_imported_when_it_is_used_is_served_with_what_only_this_imports():
+    served = served_modules(FEW, ["start.js"])
+    assert served[LATER] == EAGER + (
+        'import { $modules } from "./parts.js";\n'
+        '$modules["x/only.js"] ??= (() => {\n'
+        "const own = 3;\n"
+        "\nreturn { own };\n})();\n"
+        '$modules["x/used.js"] ??= (() => {\n'
+        'const { tool } = $modules["tool.js"];\n'
+        'const { own } = $modules["x/only.js"];\n'
+        "class Used {}\n"
+        "\nreturn { Used };\n})();\n"
+        "export { $modules };\n"
+        "//# sourceMappingURL=later.js.map\n"
+    )
+
+
+def test_the_settings_of_gamepads_pictures_and_recordings_come_when_they_are_used():
+    text = served_modules(own_files(".js"))[LATER]
+    assert set(re.findall(r'^\$modules\["(.+)"\] \?\?= ', text, re.M)) == {
+        "features/drive/gamepad_panel.js",
+        "features/drive/gamepad_picture.js",
+        "features/export/export_copy.js",
+        "features/export/export_picture.js",
+        "features/player/player_bar.js",
+        "features/player/player_position.js",
+    }
 
 
 def test_the_address_of_a_module_within_another_has_the_same_exports():
@@ -186,7 +224,13 @@ def test_the_address_of_a_module_within_another_has_the_same_exports():
         'import { $modules } from "../parts.js";\n'
         'export default $modules["x/one.js"].default;\n'
     )
-    assert set(served) - set(FEW) == {PARTS, PARTS + ".map", "start.js.map"}
+    assert set(served) - set(FEW) == {
+        PARTS,
+        PARTS + ".map",
+        LATER,
+        LATER + ".map",
+        "start.js.map",
+    }
 
 
 def test_a_text_in_backticks_keeps_its_indentation():
@@ -235,7 +279,8 @@ def test_all_declared_browser_parts_are_served_with_their_styles():
     for name in names:
         if name.endswith(".js"):
             assert name.startswith(PART_FOLDERS), name
-            bundle = modules[FIRST_PARTS.get(name, PARTS)]
+            usual = LATER if name in LATER_PARTS else PARTS
+            bundle = modules[FIRST_PARTS.get(name, usual)]
             assert f'$modules["{name}"] ??= (' in bundle, name
         else:
             first = name.removesuffix(".css") + ".js" in FIRST_PARTS
@@ -258,6 +303,7 @@ def test_all_declared_browser_parts_are_served_with_their_styles():
         "export const { a } = {};",
         "export default 1;",
         'import { a } from "./gone.js";',
+        'const a = () => import("./gone.js");',
         'import { own } from "./a.js";',
     ],
 )

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { mock, test } from "node:test";
 
-import { importOf } from "../../src/webmap/web/browser_parts.js";
+import { importOf, partOf } from "../../src/webmap/web/browser_parts.js";
 
 let modules = 0;
 
@@ -54,4 +54,33 @@ test("a module with a syntax error is not requested again", async () => {
   const { asked, load } = loader(9, new SyntaxError("Unexpected token"));
   await assert.rejects(importOf(newAddress(), load), SyntaxError);
   assert.equal(asked.length, 1);
+});
+
+test("parts of one bundle share its import, and come in one turn of the loop", async () => {
+  const names = ["features/one.js", "features/two.js", "features/three.js"];
+  const $modules = Object.fromEntries(names.map((name) => [name, { name }]));
+  const asked = [];
+  const load = async (url) => {
+    asked.push(url);
+    await new Promise((done) => setImmediate(done));
+    return { $modules };
+  };
+  const turns = [];
+  let turn = 0;
+  const count = setInterval(() => (turn += 1));
+  const loaded = names.map(async (name) => {
+    assert.equal((await partOf(name, load)).name, name);
+    turns.push(turn);
+  });
+  await Promise.all(loaded);
+  clearInterval(count);
+  assert.equal(asked.length, 1);
+  assert.equal(new Set(turns).size, 1);
+});
+
+test("a bundle that failed is requested again for the next part", async () => {
+  const name = "features/stop/stop_button.js";
+  await assert.rejects(partOf(name, loader(9).load), /Failed to fetch/);
+  const load = async () => ({ $modules: { [name]: { name } } });
+  assert.equal((await partOf(name, load)).name, name);
 });

@@ -6,7 +6,8 @@ costs the browser some milliseconds. So a page loads the bundles of :data:`START
 function of its own. One object ``$modules`` has the exports of all by name. So every
 module is one instance, also if a page loads a bundle again after a failure: at the
 address of a module within a bundle is a module that exports the same objects, for
-modules of users. The style sheets of features are served as one too.
+modules of users. The style sheets of features are served as one too. What is imported
+by ``import()`` is in a bundle of its own, :data:`LATER`.
 
 Indentation and comments on lines of their own are left out, and lines of comments stay
 empty, so that lines have the same numbers everywhere. A source map has the sources as
@@ -38,6 +39,13 @@ FIRST_PARTS = {
 PARTS = "parts.js"
 """The bundle of all others, which a page loads when its first picture is there."""
 
+LATER = "later.js"
+"""The bundle of what few pages need, and of what a page needs when somebody uses it:
+modules that others import by ``import("./x.js")`` only, with what only these import."""
+
+LATER_PARTS = ("features/player/player_bar.js",)
+"""The browser parts that this bundle has too."""
+
 PART_FOLDERS = ("console/", "features/")
 """Where the modules of browser parts are, which a page gets from the bundles."""
 
@@ -61,6 +69,7 @@ _IMPORT = re.compile(r'^import (\{[^}]*\}) from "(\.[^"]+)";$', re.M)
 _EXPORT = re.compile(
     r"^export (default )?(?=(?:async )?(?:function|class|const) (\w+))", re.M
 )
+_LATER = re.compile(r'\bimport\("(\.[^"]+)"\)')
 _OTHER = re.compile(r"^(?:import|export)\b", re.M)
 _COMMENT = re.compile(r"^[ \t]*(?://.*|/\*[^*]*\*+(?:[^/*][^*]*\*+)*/[ \t]*)$", re.M)
 _INDENTATION = re.compile(r"(?<=\n)[ \t]+")
@@ -102,11 +111,16 @@ def served_modules(
             if owner == bundle:
                 add(part, bundle, ())
         add(bundle, bundle, ())
+    later = _later(sources)
+    needed = _needed(later, sources)
     for name in sources:
-        add(name, PARTS, ())
+        if name not in needed:
+            add(name, PARTS, ())
+    for name in later:
+        add(name, LATER, ())
     texts = {}
     before = ""
-    for bundle in (*starts, PARTS):
+    for bundle in (*starts, PARTS, LATER):
         within = {
             one: sources[one] for one, owner in bundles.items() if owner == bundle
         }
@@ -116,6 +130,30 @@ def served_modules(
         if name != bundle:
             texts[name] = _import(bundle, name) + _exported(name, sources[name])
     return texts
+
+
+def _later(sources: Mapping[str, str]) -> list[str]:
+    """Return the modules that nobody needs before they are used."""
+    found = {name for name in LATER_PARTS if name in sources}
+    for name, source in sources.items():
+        for address in _LATER.findall(shortened(source)):
+            found.add(_beside(name, address))
+            if _beside(name, address) not in sources:
+                raise ValueError(f"{name} imports {address}, which is missing")
+    return sorted(found)
+
+
+def _needed(names: Sequence[str], sources: Mapping[str, str]) -> set[str]:
+    """Return these modules, with all that they import."""
+    found: set[str] = set()
+    todo = list(names)
+    while todo:
+        name = todo.pop()
+        if name not in found and name in sources:
+            found.add(name)
+            addresses = _imports(name, sources[name])
+            todo += [_beside(name, address) for address in addresses]
+    return found
 
 
 def _bundle(bundle: str, sources: Mapping[str, str], before: str) -> tuple[str, str]:
@@ -164,7 +202,12 @@ def _statements(name: str, source: str) -> str:
         names = found[1].replace(" as ", ": ")
         return f'const {names} = $modules["{_beside(name, found[2])}"];'
 
+    def used(found: re.Match[str]) -> str:
+        browser_parts = '$modules["web/browser_parts.js"]'
+        return f'{browser_parts}.laterModule("{_beside(name, found[1])}")'
+
     text = shortened(_EXPORT.sub("", _IMPORT.sub(imported, source)))
+    text = _LATER.sub(used, text)
     exports = _EXPORT.findall(source)
     pairs = [f"default: {local}" if default else local for default, local in exports]
     return f"{text}\nreturn {{ {', '.join(pairs)} }};\n"

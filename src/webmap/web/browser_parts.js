@@ -1,5 +1,13 @@
 import { OWN_FILES, resolve } from "./access.js";
-import { FIRST_PARTS, FIRST_SHEETS, PARTS, PART_FOLDERS, PART_SHEETS } from "./constants.js";
+import {
+  FIRST_PARTS,
+  FIRST_SHEETS,
+  LATER,
+  LATER_PARTS,
+  PARTS,
+  PART_FOLDERS,
+  PART_SHEETS,
+} from "./constants.js";
 
 /** @typedef {import('./map.js').MapCanvas} MapCanvas */
 
@@ -32,6 +40,9 @@ const FIRST = new Map(Object.entries(FIRST_PARTS));
 /** Milliseconds for which the other parts wait for STOP and driving. */
 const FIRST_PATIENCE = 1000;
 
+/** The media of a style sheet that is loaded and does not apply yet. */
+const WAITS = "not all";
+
 /** Loads, attaches and detaches the browser parts of modules. */
 export class BrowserParts {
   /** @param {BrowserPartsPage} page */
@@ -63,10 +74,12 @@ export class BrowserParts {
     const part = ownPart(url);
     const first = part !== null && FIRST.has(part);
     const sheet = first ? FIRST_SHEETS : PART_SHEETS;
-    const style = css ? this._addStyle(part ? sheet : css) : null;
+    const style = css ? this._addStyle(part ? sheet : css, first) : null;
     const load = () => {
       if (style) style.link.href = style.url;
-      const code = part ? partOf(part) : moduleOf(url);
+      const code = (part ? partOf(part) : moduleOf(url)).finally(() => {
+        if (style) this._apply(style.link);
+      });
       return this._load(attached, instance, code, options).catch((error) => {
         // Not every browser loads a failed import of a module again.
         const hint = error instanceof TypeError ? " Reload the page to try again." : "";
@@ -138,17 +151,33 @@ export class BrowserParts {
   }
 
   /**
+   * Apply a style sheet together with its parts: applied before, the browser would
+   * compute the styles of the page once more.
+   *
+   * @param {HTMLLinkElement} link
+   */
+  _apply(link) {
+    if (link.media !== WAITS) return;
+    link.media = "all";
+    if (link.sheet) this._page.onStyles();
+  }
+
+  /**
    * @param {string} css
+   * @param {boolean} first Whether it is of STOP and driving, and applies at once.
    * @returns {{link: HTMLLinkElement, url: string} | null} In the order of the modules;
    *     null if there is nothing to load.
    */
-  _addStyle(css) {
+  _addStyle(css, first) {
     const url = resolve(css, OWN_FILES);
     if (url === null || this._styles.has(url)) return null;
     this._styles.add(url);
     const link = document.createElement("link");
     link.rel = "stylesheet";
-    link.addEventListener("load", () => this._page.onStyles());
+    if (!first) link.media = WAITS;
+    link.addEventListener("load", () => {
+      if (link.media !== WAITS) this._page.onStyles();
+    });
     document.head.append(link);
     return { link, url };
   }
@@ -164,16 +193,53 @@ function ownPart(url) {
   return PART_FOLDERS.some((folder) => name.startsWith(folder)) ? name : null;
 }
 
+/** @type {Map<string, Promise<any>>} The bundles that were requested, by their address. */
+const bundles = new Map();
+
 /**
  * Load WebMap's own part of this name, with the others of its bundle.
  *
  * @param {string} name
+ * @param {(url: string) => Promise<any>} [load]
+ * @returns {Promise<any>}
  */
-async function partOf(name) {
-  const bundle = new URL(FIRST.get(name) ?? PARTS, OWN_FILES);
-  const { $modules } = await importOf(bundle.href);
-  if (!$modules[name]) throw new Error("WebMap has no such module");
-  return $modules[name];
+export async function partOf(name, load = importOf) {
+  const bundle = FIRST.get(name) ?? (LATER_PARTS.includes(name) ? LATER : PARTS);
+  return moduleIn(bundle, name, load);
+}
+
+/**
+ * Load a module that another one imports when somebody uses it: the server replaces
+ * `import("./x.js")` by a call of this function.
+ *
+ * @param {string} name
+ * @returns {Promise<any>}
+ */
+export async function laterModule(name) {
+  return moduleIn(LATER, name, importOf);
+}
+
+/**
+ * All that wait for a bundle share one import, so that parts are attached together: with
+ * an import for each, the browser computed styles and painted between them.
+ *
+ * @param {string} bundle
+ * @param {string} name
+ * @param {(url: string) => Promise<any>} load
+ * @returns {Promise<any>}
+ */
+async function moduleIn(bundle, name, load) {
+  const { href } = new URL(bundle, OWN_FILES);
+  const loading = bundles.get(href) ?? load(href);
+  bundles.set(href, loading);
+  try {
+    const { $modules } = await loading;
+    if (!$modules[name]) throw new Error("WebMap has no such module");
+    return $modules[name];
+  } catch (error) {
+    bundles.delete(href);
+    throw error;
+  }
 }
 
 /** @param {string | null} url */

@@ -6,6 +6,12 @@ export const FOLDER = "/_webmap/";
 /** The bundle with WebMap's other browser parts. */
 export const PARTS = "parts.js";
 
+/** The bundle of what is loaded when somebody uses it. */
+export const LATER = "later.js";
+
+/** The browser parts of this bundle. */
+export const LATER_PARTS = Object.freeze(["features/player/player_bar.js"]);
+
 /** Where their own modules are. */
 export const PART_FOLDERS = Object.freeze(["console/", "features/"]);
 

@@ -10,7 +10,7 @@ import {
   isComplete,
   nameOf,
 } from "../../web/inputs/pad_maps.js";
-import { button, html, setHidden, setText, svg } from "../../web/tools/elements.js";
+import { button, html, setHidden, setText } from "../../web/tools/elements.js";
 import { Picture } from "./gamepad_picture.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -21,9 +21,6 @@ import { Picture } from "./gamepad_picture.js";
 /** @typedef {AxisAction | ButtonAction} Action */
 
 const NAME = "Gamepad settings";
-const ICON =
-  "M7.5 7h9c4 0 6 10 4 11s-4-4-5.5-4H9c-1.5 0-3.5 5-5.5 4s0-11 4-11z" +
-  "M8 8.5v4M6 10.5h4M16.5 10.5h.1";
 
 const NOTHING = "No gamepad is connected. Connect one and press a button of the gamepad.";
 const READY = "Here no input moves a robot. STOP works, also by the gamepad, and closes this.";
@@ -50,14 +47,6 @@ export class GamepadPanel {
     this._map = map;
     this._devices = devicesOf(map.drive);
     this._maps = this._devices.padMaps;
-    /** Shown beside the buttons of driving while there is a gamepad. */
-    this.go = button("webmap-gamepad-go", "", () => this.open());
-    this.go.title = NAME;
-    this.go.setAttribute("aria-label", NAME);
-    const drawing = { viewBox: "0 0 24 24", class: "webmap-symbol", "aria-hidden": "true" };
-    this.go.append(svg("svg", drawing, svg("path", { d: ICON })));
-    this.go.hidden = true;
-    this._open = () => this.open();
     /** @type {Pad | null} */
     this._pad = null;
     /** @type {Picture | null} */
@@ -94,23 +83,12 @@ export class GamepadPanel {
       ),
     );
     this._dialog.addEventListener("close", () => this._dialog.remove());
-    this._offs = [
-      map.drive.on("stop", () => this._dialog.close()),
-      map.drive.on("step", () => this._offer()),
-    ];
+    this._off = map.drive.on("stop", () => this._dialog.close());
   }
 
   destroy() {
-    for (const off of this._offs) off();
+    this._off();
     this._dialog.remove();
-    this.go.remove();
-    if (this._devices.padSettings === this._open) this._devices.padSettings = null;
-  }
-
-  _offer() {
-    // One map of several on the page is enough.
-    this._devices.padSettings ??= this._open;
-    setHidden(this.go, !this._devices.pads?.seen);
   }
 
   open() {

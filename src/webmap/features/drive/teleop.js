@@ -5,7 +5,7 @@ import { heldByAnother, isLatched, mayTake, stopOf } from "../../web/motion/repo
 import { describe, inputsOf } from "../../web/motion/status.js";
 import { svg } from "../../web/tools/elements.js";
 import { lay, overlayOf, ownCorners, ownPlace } from "../../web/tools/overlay.js";
-import { GamepadPanel } from "./gamepad_panel.js";
+import { GamepadButton } from "./gamepad_button.js";
 import { Panel, Requests, StickPad } from "./teleop_panel.js";
 
 /** @typedef {import('../../web/drive.js').Drive} Drive */
@@ -82,8 +82,8 @@ class Teleop {
     ];
     if (ownPlace(stopPlace)) takes.push(lay(map, this._panel.stop, undefined, stopPlace));
     this._devices = devicesOf(this._drive);
-    this._pads = new GamepadPanel(map);
-    this._panel.addButton(this._pads.go);
+    this._pads = new GamepadButton(map);
+    this._panel.addButton(this._pads.element);
     this._drivingMap = {
       map,
       get holonomic() {

@@ -180,11 +180,13 @@ class Overlay {
  * @param {Event} event
  */
 function makeRoom({ target: opened }) {
-  if (!(opened instanceof HTMLDetailsElement) || !opened.open || !isLoose(opened)) return;
-  for (const other of opened.parentElement?.children ?? []) {
-    if (other === opened || !(other instanceof HTMLDetailsElement)) continue;
-    if (other.open && isLoose(other)) other.open = false;
-  }
+  if (!(opened instanceof HTMLDetailsElement) || !opened.open) return;
+  const others = [...(opened.parentElement?.children ?? [])].filter(
+    (other) => other instanceof HTMLDetailsElement && other !== opened && other.open,
+  );
+  // Without an open one, no styles are read: the browser would have to compute them.
+  if (others.length === 0 || !isLoose(opened)) return;
+  for (const other of others) if (isLoose(other)) other.removeAttribute("open");
 }
 
 /** @param {Element} details */
