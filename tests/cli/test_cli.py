@@ -136,6 +136,7 @@ def test_a_port_in_use_prints_one_error_line_and_exits_with_code_2(arguments, pa
         (("run", "PAGE", "--port", 0, "--no-browser"), WEB),
         (("view", "ws://127.0.0.1:1", *ROBOT, "--port", 0, "--no-browser"), WEB),
     ],
+    ids=["sim", "demo", "run", "view"],
 )
 def test_a_command_prints_one_ready_line_and_a_signal_ends_it_with_exit_code_0(
     command, line, sig, page

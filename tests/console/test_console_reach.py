@@ -1,13 +1,11 @@
 """STOP, the stick and the state of motion are visible, whatever else is open."""
 
-from contextlib import suppress
-
 import pytest
 from console_ready import assert_free
-from playwright.sync_api import TimeoutError as Late
 from playwright.sync_api import expect
 
 from equipment.chromium import end_stops
+from equipment.waiting import polls
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -99,10 +97,12 @@ def test_a_phone_on_its_side_has_stop_left_the_stick_right_and_the_map_between(
     page.locator("#sheet").click()
     for width, height in [(844, 390), (915, 412), (932, 430), (956, 440)]:
         page.set_viewport_size({"width": width, "height": height})
-        with suppress(Late):  # the page lays itself out after the change
-            page.wait_for_function(f"Object.values(({ON_ITS_SIDE})()).every(Boolean)")
-        seen = page.evaluate(ON_ITS_SIDE)
-        assert all(seen.values()), ((width, height), seen)
+        # The page lays itself out after the change.
+        for _ in polls(f"the layout in {width} x {height}"):
+            seen = page.evaluate(ON_ITS_SIDE)
+            if all(seen.values()):
+                break
+            page.wait_for_timeout(50)
     # A small desktop window, and a tablet with an open keyboard.
     for width, height in [(932, 600), (1180, 420)]:
         page.set_viewport_size({"width": width, "height": height})

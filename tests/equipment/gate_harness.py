@@ -231,9 +231,9 @@ class Bench:
         }
         self.send(who, **{**fields, **changes})
 
-    def hold(self, seconds, who="a", **axes):
+    def hold(self, seconds, who="a", step=0.01, **axes):
         """Let a page send its inputs at 20 Hz."""
-        self.run(seconds, lambda: self.drive(who, **axes))
+        self.run(seconds, lambda: self.drive(who, **axes), step)
 
     def drive_off(self, who="a", x=1.0, robot="r1"):
         """Take the robot, send released inputs, then drive."""

@@ -36,6 +36,15 @@ REPORT = "SendToDisplay(message=RobotReport"
 HOOK = re.compile(r"StopHook\((\w+)='([^']*)', type='([^']*)'\)")
 """A stop hook; the record has it as a table."""
 
+UNRECORDED = (
+    ", check=None",
+    ", checked=None",
+    ", check_every=None",
+    ", only_echoes=False",
+    ", drive_without_proof=False",
+)
+"""What most robots do not have is not part of the record."""
+
 LENGTH = 12
 """Hexadecimal digits of a digest."""
 
@@ -79,10 +88,10 @@ class Decisions:
 
     def _note(self, event: Any, now: float, actions: Any) -> None:
         line = f"{now:.6f} {event!r} {text_of(actions)}"
-        # What most robots do not have is not part of the record.
-        line = re.sub(r", check(ed|_every)?=None", "", line)
-        line = HOOK.sub(r"{'\1': '\2', 'type': '\3'}", line)
-        line = re.sub(r", (only_echoes|drive_without_proof)=False", "", line)
+        for text in UNRECORDED:
+            line = line.replace(text, "")
+        if "StopHook(" in line:
+            line = HOOK.sub(r"{'\1': '\2', 'type': '\3'}", line)
         if "WebMap-" in line:
             line = re.sub(r"WebMap-\w+-\d+", lambda match: self._number(match[0]), line)
         self.count += 1

@@ -116,7 +116,7 @@ class TestDeclaration:
         bench.break_links()
         bench.handle(protocol.Forget("r1"))
         if later is None:  # the file on disk keeps the mark for the next gate
-            bench.run(61.0)
+            bench.run(61.0, step=0.05)
             assert bench.did(actions.Detach) == [actions.Detach(KEY, "r1")]
             assert bench.did(actions.MarkDriven) == [actions.MarkDriven(KEY, True)]
             return

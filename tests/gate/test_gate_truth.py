@@ -170,7 +170,7 @@ class TestAlarm:
         self, bench
     ):
         self.run(bench, 1.2, 0.31, x=0.0)
-        bench.hold(59.0)
+        bench.hold(59.0, step=0.05)
         assert bench.report().alarm
         bench.hold(3.0)
         assert bench.report().alarm is None

@@ -27,7 +27,7 @@ def run(tmp_path):
     def run(source: str, *options: str) -> tuple[int, str]:
         (tmp_path / "test_it.py").write_text(source)
         (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers =\n  safety\n")
-        command = [sys.executable, str(TOOL), "2", *options, "test_it.py"]
+        command = [sys.executable, str(TOOL), "1", *options, "test_it.py"]
         done = subprocess.run(
             command,
             cwd=tmp_path,

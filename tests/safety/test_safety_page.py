@@ -1,9 +1,7 @@
 """docs/safety.md and README.md name tests that exist and the newest figures."""
 
-import ast
 import re
 
-import pytest
 from safety_figures import DOCS, Figure
 from safety_promises import PAGE as FILE
 from safety_promises import (
@@ -15,27 +13,16 @@ from safety_promises import (
     worst,
 )
 
+from equipment.named_tests import names_of_tests
+
 PAGE = FILE.read_text()
 TESTS = DOCS.parent / "tests"
 
 
-def functions():
-    """Return the names of all tests."""
-    trees = (ast.parse(path.read_text()) for path in TESTS.rglob("test_*.py"))
-    nodes = (node for tree in trees for node in ast.walk(tree))
-    return {
-        node.name
-        for node in nodes
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
-        and node.name.startswith("test_")
-    }
-
-
-@pytest.mark.slow
 def test_every_test_named_in_the_safety_document_exists():
     named = set(re.findall(r"`(test_\w+)`", PAGE))
     assert len(named) > 30, "the page names hardly any test"
-    assert named - functions() == set()
+    assert named - names_of_tests() == set()
 
 
 def test_every_test_file_named_in_the_safety_document_exists():
@@ -59,10 +46,9 @@ def test_every_promise_names_a_test_and_no_promise_is_missing():
     assert without == []
 
 
-@pytest.mark.slow
 def test_the_table_shows_every_promise_with_its_newest_figure_and_its_test():
     assert sorted({promise.number for promise in PROMISES}) == NUMBERS
-    assert {promise.shown_by for promise in PROMISES} - functions() == set()
+    assert {promise.shown_by for promise in PROMISES} - names_of_tests() == set()
     assert promise_table(kept_figures()) in PAGE, (
         "run python tests/safety/safety_promises.py"
     )

@@ -48,7 +48,7 @@ def drawn(data, encoding, name):
 
 
 @pytest.mark.parametrize(("encoding", "name"), TYPES)
-@settings(max_examples=4)
+@settings(max_examples=2)
 @given(data=st.data())
 def test_a_message_of_an_included_type_is_read_as_it_was_written(encoding, name, data):
     read, write = tools(encoding, name)
@@ -70,7 +70,7 @@ def outcome(read, data):
 
 
 @pytest.mark.parametrize("encoding", LANGUAGES)
-@settings(max_examples=100)
+@settings(max_examples=50)
 @given(data=st.data())
 def test_the_transforms_of_a_view_are_those_of_the_plain_message(encoding, data):
     name = "tf2_msgs/TFMessage"
@@ -162,7 +162,7 @@ def test_a_message_is_refused_that_is_shorter_or_longer_than_its_fields(
 
 
 @pytest.mark.parametrize(("encoding", "name"), CUT)
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(data=st.data())
 def test_other_bytes_raise_only_errors_of_the_protocol(encoding, name, data):
     read, write = tools(encoding, name, VIEWS[name])
