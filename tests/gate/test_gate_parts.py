@@ -121,7 +121,7 @@ class TestLeases:
 
 class TestLimits:
     def in_force(self, *more, **changes):
-        return speed_in_force([*caps_of(spec(**changes)), *more])
+        return speed_in_force([*caps_of(spec(**changes).base), *more])
 
     def test_the_lowest_limits_are_in_force_with_their_reasons(self):
         page = Cap(0.4, 9.0, "normal limit")

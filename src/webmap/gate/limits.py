@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from webmap.base.geometry import Twist
-from webmap.gate.protocol import RobotSpec
+from webmap.config.motion import TwistConfig
 
 if TYPE_CHECKING:
     from webmap.gate.events import StopRecord
@@ -88,16 +88,14 @@ PLANE = Axes()
 """The axes of a machine that moves only in the plane."""
 
 
-def axes_of(specs: Iterable[RobotSpec]) -> Axes:
+def axes_of(bases: Iterable[TwistConfig]) -> Axes:
     """Return the least limit of each axis; 0 if one robot states no limit for it.
 
     Args:
-        specs: The robots that are declared for the machine.
+        bases: The bases of the robots that are declared for the machine.
 
     """
-    limits = [
-        (spec.z_max or 0.0, spec.rx_max or 0.0, spec.ry_max or 0.0) for spec in specs
-    ]
+    limits = [(b.z_max or 0.0, b.rx_max or 0.0, b.ry_max or 0.0) for b in bases]
     return Axes(*map(min, zip(*limits, strict=True)))
 
 
@@ -119,16 +117,16 @@ class Speed:
     why: tuple[str, ...]
 
 
-def caps_of(spec: RobotSpec, tested: "StopRecord | None" = None) -> list[Cap]:
+def caps_of(base: TwistConfig, tested: "StopRecord | None" = None) -> list[Cap]:
     """Return the caps of the robot itself.
 
     Args:
-        spec: The robot.
+        base: The base of the robot.
         tested: The result of its stop test; it overrides the stated ``stops_within``.
 
     """
     caps = []
-    seconds = spec.stops_within if tested is None else tested.seconds
+    seconds = base.stops_within if tested is None else tested.seconds
     error = 0.0 if tested is None else min(tested.error, ERROR)
     if seconds is None and tested is not None:
         why = f"stop test failed on {tested.date}"
@@ -138,8 +136,8 @@ def caps_of(spec: RobotSpec, tested: "StopRecord | None" = None) -> list[Cap]:
     elif seconds - error > STOPS_WITHIN:
         why = f"command timeout of the base over {STOPS_WITHIN:g} s: {seconds:g} s"
         caps.append(Cap(SLOW_V, SLOW_W, why))
-    v = math.inf if spec.v_max is None else spec.v_max
-    w = math.inf if spec.w_max is None else spec.w_max
+    v = math.inf if base.v_max is None else base.v_max
+    w = math.inf if base.w_max is None else base.w_max
     caps.append(Cap(v, w, "limit of the robot"))
     return caps
 

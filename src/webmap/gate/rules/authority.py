@@ -92,7 +92,7 @@ class MotionConditions:
                 return without_proof(self._url)
             return None
         goals = self._robots.goals[self._robots.newest.id]
-        if goals.spec.goal_topic is None and goals.spec.action is None:
+        if goals.spec.move is None:
             return "the robot has no velocity topic and no goal topic"
         return goals.why_not
 

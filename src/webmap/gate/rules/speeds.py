@@ -135,8 +135,8 @@ class MachineSpeeds:
         return least(self._caps())
 
     def _caps(self) -> list[Cap]:
-        specs = self._robots.specs.values()
-        own = [cap for spec in specs for cap in caps_of(spec, self.tested)]
+        bases = self._robots.bases
+        own = [cap for base in bases for cap in caps_of(base, self.tested)]
         return own + self._check.caps
 
     @property
