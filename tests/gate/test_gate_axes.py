@@ -12,9 +12,8 @@ from webmap.base.geometry import Twist
 from webmap.config.motion import ScanAssistConfig
 from webmap.gate import commands, events, protocol
 from webmap.gate.events import Scan
-from webmap.gate.limits import Axes, Speed, fit, ramp
 from webmap.gate.protocol import PROGRAM
-from webmap.gate.specs import checked
+from webmap.gate.specs import Axes, Speed, checked, fit, ramp
 
 FLYING = {"z_max": 0.5, "rx_max": 0.2, "ry_max": 0.1}
 EVERYTHING = Twist(0.1, 0.2, 0.3, vz=0.4, wx=0.05, wy=-0.06)

@@ -14,7 +14,7 @@ from webmap.gate.lanes import calls, navigation
 from webmap.gate.lanes.calls import RosbridgeCall, ServiceCalls
 from webmap.gate.lanes.links import Links
 from webmap.gate.lanes.navigation import answer_to
-from webmap.gate.limits import Cap
+from webmap.gate.specs import Cap
 
 LOCK = StopHook(topic="/lock", type="std_msgs/Bool")
 E_STOP = StopHook(service="/e_stop", type="std_srvs/Trigger")

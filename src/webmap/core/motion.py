@@ -25,10 +25,9 @@ from webmap.config.motion import (
 )
 from webmap.config.reading import Config
 from webmap.core.robot_names import named_robots
-from webmap.gate.limits import PLANE, axes_of
 from webmap.gate.protocol import RobotReport, RobotSpec
 from webmap.gate.rules.obedience import MOST_NAME, MOST_NODES
-from webmap.gate.specs import resolved
+from webmap.gate.specs import PLANE, axes_of, resolved
 from webmap.poses.odometry import TypeQuery
 from webmap.ros.bridge import Bridge
 from webmap.ros.motion_topics import STOP

@@ -5,10 +5,10 @@ from operator import attrgetter
 from webmap.config.motion import StopHook, TwistConfig
 from webmap.gate.actions import Detach, Emit, RunHook, SendToDisplay
 from webmap.gate.events import HookEnded, Key
-from webmap.gate.limits import Axes, axes_of
 from webmap.gate.protocol import Refused, RobotSpec
 from webmap.gate.rules.goals import Goals
 from webmap.gate.rules.health import LinkHealth
+from webmap.gate.specs import Axes, axes_of
 
 NO_LINK = "not sent yet: no connection"
 
