@@ -112,7 +112,7 @@ GATE_BESIDE := $(addprefix tests/gate/test_gate_,activity.py client.py assist_ro
   recorded.py schedules.py) \
   $(addprefix tests/ros/test_ros_,image_answer.py incoming.py large.py leaving.py limits.py offload.py \
   offload_parts.py paced.py questions.py renewal.py timing.py unwatched.py work.py)
-WITH_GATE := $(filter-out $(GATE_BESIDE),$(wildcard tests/gate/test_*.py tests/base/test_*.py tests/ros/test_*.py)) \
+WITH_GATE := $(filter-out $(GATE_BESIDE),$(wildcard tests/gate/test_*.py tests/base/test_*.py tests/config/test_*.py tests/ros/test_*.py)) \
   tests/ros/foxglove/test_foxglove_protocol.py
 test-gate: $(DEV)
 	$(PY) tools/pytest_beside.py $(JOBS) $(TO_RESULTS) -m "not serial" \

@@ -22,6 +22,7 @@ from benchmarks.latency import relayed, socket_of
 from benchmarks.processes import started
 from webmap.agents.gates import Gates
 from webmap.agents.peer import close_peers
+from webmap.config.motion import TwistConfig
 from webmap.core.motion import id_at_agent
 from webmap.gate.protocol import RobotSpec
 from webmap.ros.rosbridge import ops
@@ -132,9 +133,7 @@ def delays(url: str, id: str, robot: WitnessRobot) -> list[float]:
             RobotSpec(
                 id=id,
                 name="Bob",
-                bridge_url=url,
-                twist_topic="/cmd_vel",
-                stops_within=0.5,
+                twist=TwistConfig(topic="/cmd_vel", stops_within=0.5, bridge=url),
                 odometry_topic="/odom",
                 odometry_type="nav_msgs/Odometry",
             )

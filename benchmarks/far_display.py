@@ -19,6 +19,7 @@ from webmap.agents.gates import Gates
 from webmap.agents.link import AgentConnection
 from webmap.agents.peer import close_peers
 from webmap.base.tasks import LoopThread
+from webmap.config.motion import TwistConfig
 from webmap.gate.protocol import RobotSpec
 
 
@@ -44,7 +45,8 @@ def main(agent: str, pages: int) -> None:
 
     try:
         robot = f"{agent_in(agent)}/looked-at"
-        gates.declare(RobotSpec(id=robot, name="robot", bridge_url=agent))
+        twist = TwistConfig(topic="/cmd_vel", bridge=agent)
+        gates.declare(RobotSpec(id=robot, name="robot", twist=twist))
         for number in range(pages):
             gates.connect(f"viewer {number}", "operator", lambda _: None, print)
         thread.call(begin())

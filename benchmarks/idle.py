@@ -21,6 +21,7 @@ from websockets.asyncio.server import ServerConnection, serve
 
 from benchmarks.harness import Comparison, Contender, Figures, compare
 from benchmarks.processes import module
+from webmap.config.motion import MoveConfig, TwistConfig
 from webmap.gate.display.client import GateClient
 from webmap.gate.protocol import Report, RobotReport, RobotSpec
 
@@ -86,11 +87,13 @@ def _spec(number: int, url: str) -> RobotSpec:
     return RobotSpec(
         id=f"robot {number}",
         name=f"robot {number}",
-        bridge_url=url,
-        twist_topic=f"/robot_{number}/cmd_vel",
+        twist=TwistConfig(topic=f"/robot_{number}/cmd_vel", bridge=url),
         odometry_topic=f"/robot_{number}/odom",
-        goal_topic=f"/robot_{number}/goal",
-        cancel_topic=f"/robot_{number}/cancel",
+        move=MoveConfig(
+            topic=f"/robot_{number}/goal",
+            cancel_topic=f"/robot_{number}/cancel",
+            bridge=url,
+        ),
     )
 
 

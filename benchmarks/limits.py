@@ -27,6 +27,7 @@ from benchmarks.plot import Curve, Plot, save
 from benchmarks.processes import used
 from benchmarks.stamped import SPEEDS, topics
 from webmap.agents.gates import Gates
+from webmap.config.motion import TwistConfig
 from webmap.gate.protocol import Report, RobotReport, RobotSpec
 
 FEW = 50
@@ -162,8 +163,7 @@ def gate_with(robots: int, seconds: float) -> Figures:
                 RobotSpec(
                     id=f"r{number}",
                     name=f"robot {number}",
-                    bridge_url=url,
-                    twist_topic=velocity,
+                    twist=TwistConfig(topic=velocity, bridge=url),
                     odometry_topic=odometry,
                     odometry_type="nav_msgs/Odometry",
                 )

@@ -24,6 +24,7 @@ from webmap import Bridge
 from webmap.agents.gates import Gates
 from webmap.agents.peer import close_peers
 from webmap.base.tasks import LoopThread
+from webmap.config.motion import TwistConfig
 from webmap.core.motion import id_at_agent
 from webmap.gate.protocol import RobotSpec
 from webmap.ros.messages import LaserScanMsg, OdometryMsg
@@ -118,7 +119,8 @@ def measured(agent: str, line: Line, robots: int, seconds: float) -> Figures:
     gates, arrivals = Gates(), Arrivals()
     gates.start()
     try:
-        gates.declare(RobotSpec(id=robot, name="robot_0", bridge_url=agent))
+        twist = TwistConfig(topic="/cmd_vel", bridge=agent)
+        gates.declare(RobotSpec(id=robot, name="robot_0", twist=twist))
         operator = Operator(gates, robot)
         if not operator.armable.wait(30):
             raise RuntimeError("the robot cannot be driven")

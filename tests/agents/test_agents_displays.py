@@ -6,6 +6,7 @@ import msgspec
 import pytest
 from agent_reports import REPORT
 
+from equipment.declarations import declared
 from webmap.agents import displays as displays_module
 from webmap.agents import gate_messages
 from webmap.agents.displays import Displays
@@ -27,7 +28,6 @@ from webmap.gate.protocol import (
     Ready,
     Rename,
     RobotGone,
-    RobotSpec,
     Speeds,
     Tick,
     WriterNodes,
@@ -89,7 +89,13 @@ def test_a_page_and_its_commands_reach_the_gate(west):
 @pytest.mark.parametrize(
     "message",
     [
-        RobotSpec(id="r1", name="Bob", bridge_url="ws://evil", v_max=100.0),
+        declared(
+            id="r1",
+            name="Bob",
+            bridge_url="ws://evil",
+            twist_topic="/cmd_vel",
+            v_max=100.0,
+        ),
         Forget("r1"),
         WriterNodes("r1", ("/a",)),
         Heartbeat(),

@@ -4,10 +4,11 @@ import json
 
 import pytest
 
+from equipment.declarations import declared
 from webmap.agents.gates import Gates
 from webmap.base.errors import ConfigError
 from webmap.gate.display.client import GateClient
-from webmap.gate.protocol import FromPage, FromProgram, RobotSpec, Tick
+from webmap.gate.protocol import FromPage, FromProgram, Tick
 
 AGENT = "zenoh://127.0.0.1:7447/bay3"
 
@@ -31,7 +32,7 @@ class Link:
 
 
 def spec(robot, url):
-    return RobotSpec(
+    return declared(
         id=robot,
         name=robot,
         bridge_url=url,

@@ -8,6 +8,7 @@ import msgspec
 import pytest
 from agent_reports import NAME, REPORT
 
+from equipment.declarations import declared
 from webmap.agents.displays import Displays
 from webmap.agents.gate_messages import (
     AllReports,
@@ -36,7 +37,6 @@ from webmap.gate.protocol import (
     Rename,
     RobotGone,
     RobotReport,
-    RobotSpec,
     SentTwist,
     Speeds,
     TakeReply,
@@ -55,7 +55,7 @@ class Owner:
 
     def introduction(self):
         robots = [
-            RobotSpec(id=id, name="Bob", bridge_url="zenoh://h/bay3")
+            declared(id=id, name="Bob", bridge_url="zenoh://h/bay3", goal_topic="/goal")
             for id in ("r1", "r2")
         ]
         return [*robots, PAGE]
@@ -162,7 +162,9 @@ def test_a_page_that_the_agent_has_not_greeted_gets_no_tick(bench):
 
 
 def test_declarations_stay_here(connected):
-    connected.far.send(RobotSpec(id="r1", name="Bob", bridge_url="ws://evil"))
+    connected.far.send(
+        declared(id="r1", name="Bob", bridge_url="ws://evil", goal_topic="/goal")
+    )
     connected.far.send(Forget("r1"))
     assert connected.arrive() == []
 
@@ -596,7 +598,9 @@ def test_an_agent_cannot_report_a_robot_or_a_person_by_another_name(connected):
 
 
 def test_a_robot_that_is_declared_later_is_reported_at_once(connected):
-    late = RobotSpec(id="r3", name="Bob", bridge_url="zenoh://h/bay3")
+    late = declared(
+        id="r3", name="Bob", bridge_url="zenoh://h/bay3", goal_topic="/goal"
+    )
     report = msgspec.structs.replace(REPORT, robot="r3")
     connected.receive(REPORT, 0.1)
     connected.receive(report, 0.1)

@@ -46,10 +46,10 @@ def test_a_demo_robot_uses_the_topics_of_the_simulator(dialect):
         robot = demo_robot(Bridge(url), 0, dialect)
     try:
         spec = robot.motion.spec()
-        assert spec.twist_topic == found.topic("velocity")
-        assert (spec.action, spec.action_type) == found.action
-        assert spec.goal_topic == found.topic("goal")
-        assert (spec.cancel_topic or "") == found.topic("cancel")
+        assert spec.base.topic == found.topic("velocity")
+        assert (spec.navigation.action, spec.navigation.action_type) == found.action
+        assert spec.navigation.topic == found.topic("goal")
+        assert (spec.navigation.cancel_topic or "") == found.topic("cancel")
     finally:
         robot.destroy()
 
@@ -71,7 +71,7 @@ def test_the_topics_that_only_the_lively_demo_has_exist(dialect):
         shown = dict(on_maps(robot))
         assert set(shown) == {"OccupancyGrid", "Markers"}
         assert set(shown.values()) <= set(topics)
-        assert robot.motion.spec().assist.topic in topics
+        assert robot.motion.spec().scan_assist.topic in topics
         (pause,) = [each for each in robot.modules if isinstance(each, PauseErrands)]
         assert pause.topic in topics
     finally:
@@ -84,7 +84,7 @@ def test_a_quiet_robot_and_a_free_one_show_no_costmap_and_have_no_errands(index,
     try:
         assert not on_maps(robot)
         assert not [each for each in robot.modules if isinstance(each, PauseErrands)]
-        assert (robot.motion.spec().assist is None) == quiet
+        assert (robot.motion.spec().scan_assist is None) == quiet
     finally:
         robot.destroy()
 

@@ -207,7 +207,7 @@ def test_a_new_robot_gets_a_unique_name(bridge, capsys):
     (robot,) = discover(TOPICS, "bob").robots
     came(News(robot), bridge)
     assert late.robots[0].name == "bob (bob:9090)"
-    assert late.robots[0].motion.spec().stops_within == 0.25
+    assert late.robots[0].motion.spec().base.stops_within == 0.25
     printed = capsys.readouterr()
     assert printed.out == ""
     message = "A robot appeared behind ws://bob:9090: bob (bob:9090): odometry /odom"
@@ -222,7 +222,7 @@ def test_driving_without_proof_is_declared_to_the_gate_only_if_asked_for(
     late = ViewRobots(Console(), Overrides(drive_without_proof=accepted))
     late.add(Candidate(bridge, found()))
     (made,) = late.robots
-    assert made.motion.spec().drive_without_proof is accepted
+    assert made.motion.spec().base.drive_without_proof is accepted
     made.destroy()
 
 
@@ -264,8 +264,8 @@ def test_a_robot_uses_topics_that_appear_later(bridge, capsys):
     came(News(whole, roles), bridge)
     (robot,) = late.robots
     spec = robot.motion.spec()
-    assert (spec.twist_topic, spec.goal_topic) == ("/cmd_vel", "/goal_pose")
-    assert spec.stops_within == 0.25
+    assert (spec.base.topic, spec.navigation.topic) == ("/cmd_vel", "/goal_pose")
+    assert spec.base.stops_within == 0.25
     assert robot.tf is not None
     names = {type(module).__name__ for module in robot.modules}
     assert {"LaserScanner", "Battery", "Path"} <= names

@@ -206,7 +206,7 @@ def test_limits_accepted_by_the_configuration_are_accepted_by_the_gate(limits):
     robot = Robot.from_config(RobotConfig(name="Bob", bridge=URL, twist=twist))
     try:
         spec = checked(robot.motion.spec())
-        assert {name: getattr(spec, name) for name in limits} == limits
+        assert {name: getattr(spec.base, name) for name in limits} == limits
     finally:
         robot.destroy()
 

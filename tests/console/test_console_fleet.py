@@ -28,9 +28,9 @@ def test_a_configured_robot_has_the_modules_and_the_spec_of_its_topics(bridge):
     names = [type(module).__name__ for module in robot.modules]
     assert names == ["LaserScanner", "Battery", "StateMark"]
     spec = robot.motion.spec()
-    assert (spec.twist_topic, spec.goal_topic) == ("/cmd_vel", "/goal")
-    assert spec.cancel_topic == "/cancel"
-    assert spec.stops_within == 0.25
+    assert (spec.base.topic, spec.navigation.topic) == ("/cmd_vel", "/goal")
+    assert spec.navigation.cancel_topic == "/cancel"
+    assert spec.base.stops_within == 0.25
     robot.destroy()
 
 

@@ -36,9 +36,12 @@ def test_the_spec_for_the_gate_contains_the_action_and_the_goal_topic():
         robot.set_move_topic(Link(), "/goal_pose", action="/navigate_to_pose")
 
     spec = spec_of(set_up)
-    assert (spec.goal_topic, spec.action) == ("/goal_pose", "/navigate_to_pose")
-    assert spec.goal_type == "geometry_msgs/msg/PoseStamped"
-    assert spec.pose_topic is None
+    assert (spec.navigation.topic, spec.navigation.action) == (
+        "/goal_pose",
+        "/navigate_to_pose",
+    )
+    assert spec.goal_type("PoseStamped") == "geometry_msgs/msg/PoseStamped"
+    assert spec.initial_pose is None
 
 
 def test_a_robot_can_have_an_action_without_a_goal_topic():
@@ -46,14 +49,20 @@ def test_a_robot_can_have_an_action_without_a_goal_topic():
         robot.set_move_topic(Link(), action="/move_base", action_type=MOVE_BASE)
 
     spec = spec_of(set_up)
-    assert (spec.goal_topic, spec.action_type) == (None, MOVE_BASE)
-    assert spec.goal_type == "geometry_msgs/PoseStamped"
+    assert (spec.navigation.topic, spec.navigation.action_type) == ("", MOVE_BASE)
+    assert spec.goal_type("PoseStamped") == "geometry_msgs/PoseStamped"
 
 
 def test_a_robot_can_have_an_initial_pose_topic_without_goals():
     spec = spec_of(lambda robot: robot.set_initial_pose_topic(Link()))
-    assert (spec.pose_topic, spec.pose_covariance) == ("/initialpose", SURE)
-    assert spec.pose_type == "geometry_msgs/PoseWithCovarianceStamped"
+    assert (spec.initial_pose.topic, spec.initial_pose.covariance) == (
+        "/initialpose",
+        SURE,
+    )
+    assert (
+        spec.goal_type("PoseWithCovarianceStamped")
+        == "geometry_msgs/PoseWithCovarianceStamped"
+    )
 
 
 def test_the_initial_pose_of_a_robot_without_goals_uses_its_own_frame_option():
@@ -68,8 +77,11 @@ def test_the_initial_pose_uses_the_type_spelling_and_the_frame_of_the_goals():
 
     link = Link()
     spec = spec_of(set_up)
-    assert spec.pose_type == "geometry_msgs/msg/PoseWithCovarianceStamped"
-    assert (spec.goal_frame, spec.pose_covariance) == ("hall", (1, 2, 3))
+    assert (
+        spec.goal_type("PoseWithCovarianceStamped")
+        == "geometry_msgs/msg/PoseWithCovarianceStamped"
+    )
+    assert (spec.goal_frame, spec.initial_pose.covariance) == ("hall", (1, 2, 3))
 
 
 def test_the_topics_of_goals_and_the_initial_pose_are_protected_on_the_bridge():
@@ -117,7 +129,7 @@ def test_the_spec_for_the_gate_contains_on_operator_loss(policy):
     def set_up(robot):
         robot.set_move_topic(Link(), "/goal", on_operator_loss=policy)
 
-    assert spec_of(set_up).on_operator_loss == policy
+    assert spec_of(set_up).navigation.on_operator_loss == policy
 
 
 def test_an_invalid_on_operator_loss_in_plain_data_is_refused():

@@ -58,7 +58,7 @@ def test_a_robot_with_modules_is_restored_from_json_and_toml(robot, through):
     data = robot.to_dict()
     again = Robot.from_dict(through(data), {"ws://robot:9090": robot.feed.bridge})
     assert through(again.to_dict()) == through(data)
-    assert again.motion.spec().z_max == 0.5
+    assert again.motion.spec().base.z_max == 0.5
     again.destroy()
 
 

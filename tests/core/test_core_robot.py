@@ -372,10 +372,14 @@ def test_the_spec_for_the_gate_contains_the_topics_and_limits_of_a_robot():
         await settle()
         spec = robot.motion.spec()
         assert spec.twist_type == "geometry_msgs/msg/TwistStamped"
-        assert (spec.stops_within, spec.v_max, spec.w_max) == (0.25, 1.0, None)
-        assert (spec.goal_topic, spec.goal_frame) == ("/goal", "map")
+        assert (spec.base.stops_within, spec.base.v_max, spec.base.w_max) == (
+            0.25,
+            1.0,
+            None,
+        )
+        assert (spec.navigation.topic, spec.goal_frame) == ("/goal", "map")
         robot.unadvertise_twist_topic()
-        assert robot.motion.spec().twist_topic is None
+        assert robot.motion.spec().twist is None
         robot.unadvertise_move_topic()
         assert robot.motion.spec() is None
 
@@ -471,16 +475,16 @@ def test_scan_assist_is_in_the_spec_for_the_gate_only_while_set():
     link = Link()
     robot = Robot("Bob")
     robot.set_twist_topic(link, "/cmd_vel", type="geometry_msgs/Twist")
-    assert robot.motion.spec().assist is None
+    assert robot.motion.spec().scan_assist is None
     robot.set_scan_assist("scan", 0.3, x=0.1, angle=90)
-    received = robot.motion.spec().assist
+    received = robot.motion.spec().scan_assist
     assert received.topic == "/scan"
     assert received.sensor == pytest.approx((0.1, 0.0, math.pi / 2))
-    assert all(math.hypot(x, y) >= 0.3 for x, y in received.footprint)
+    assert all(math.hypot(x, y) >= 0.3 for x, y in received.corners)
     with pytest.raises(ConfigError, match="3 corners of its outline or more"):
         robot.set_scan_assist("scan", [(0, 0), (1, 0)])
     robot.clear_scan_assist()
-    assert robot.motion.spec().assist is None
+    assert robot.motion.spec().scan_assist is None
 
 
 def test_the_id_of_a_robot_does_not_depend_on_other_robots():

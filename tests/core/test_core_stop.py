@@ -17,9 +17,10 @@ from webmap.base.errors import (
     MotionRefused,
 )
 from webmap.base.lifecycle import lifecycle
+from webmap.config.motion import StopHook
 from webmap.core.motion import RobotMotion
 from webmap.gate import pipe
-from webmap.gate.protocol import StopHook, StopReport
+from webmap.gate.protocol import StopReport
 from webmap.gate.specs import checked
 
 LOCK = {"topic": "/lock", "type": "std_msgs/Bool"}
@@ -224,9 +225,9 @@ def test_stop_hooks_and_scan_assist_are_restored_from_plain_data(robot):
     }
     again = Robot.from_dict(data, {Link.url: Link()})
     assert json.loads(json.dumps(again.to_dict())) == data
-    assert again.motion.spec().assist == robot.motion.spec().assist
-    hooks = (StopHook(**LOCK), StopHook(**E_STOP))
-    assert again.motion.spec().stop_hooks == hooks
+    assert again.motion.spec().scan_assist == robot.motion.spec().scan_assist
+    hooks = [StopHook(**LOCK), StopHook(**E_STOP)]
+    assert again.motion.spec().base.stop_hooks == hooks
     again.motion.close()
 
 
@@ -310,7 +311,7 @@ def test_an_invalid_stop_hook_is_refused_and_the_old_one_is_kept(
     drivable(robot, stop_hooks=[LOCK])
     with pytest.raises(ConfigError, match=f"robot 'Bob': .*{expected}"):
         drivable(robot, stop_hooks=hooks)
-    assert robot.motion.spec().stop_hooks == (StopHook(**LOCK),)
+    assert robot.motion.spec().base.stop_hooks == [StopHook(**LOCK)]
 
 
 def test_relative_names_of_stop_hooks_are_resolved_at_once(robot):

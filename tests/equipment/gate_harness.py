@@ -3,10 +3,10 @@
 import json
 from dataclasses import dataclass, field
 
+from equipment.declarations import declared
 from webmap.base.geometry import Twist
 from webmap.gate import actions, events, protocol
 from webmap.gate.events import Key, Press
-from webmap.gate.protocol import RobotSpec
 from webmap.gate.rules.connections import Epochs, Ticks
 from webmap.gate.rules.gate import Gate
 
@@ -21,13 +21,13 @@ def spec(**changes):
         "name": "Bob",
         "bridge_url": URL,
         "twist_topic": "/cmd_vel",
-        "stops_within": 0.0,  # so that a short loop does not reduce the speed
+        "stops_within": 1e-9,  # so that a short loop does not reduce the speed
         "v_max": 1.0,
         "w_max": 1.5,
         "cancel_topic": "/cancel",
         "goal_topic": "/goal",
     }
-    return RobotSpec(**{**fields, **changes})
+    return declared(**{**fields, **changes})
 
 
 @dataclass

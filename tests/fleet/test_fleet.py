@@ -88,13 +88,13 @@ def test_one_fleet_file_describes_robots_of_ros_1_and_ros_2(ready):
     assert fleet.fleet.to_dict()["map"] == [{"bridge": "north", "topic": "/map"}]
     bob, ann = fleet.robots
     spec = bob.motion.spec()
-    assert (bob.name, spec.twist_topic, spec.stops_within) == (
+    assert (bob.name, spec.base.topic, spec.base.stops_within) == (
         "Bob",
         "/bob/cmd_vel",
         0.25,
     )
-    assert (spec.v_max, spec.w_max) == (0.5, 1.0)
-    assert spec.cancel_topic == "/bob/move_base/cancel"
+    assert (spec.base.v_max, spec.base.w_max) == (0.5, 1.0)
+    assert spec.navigation.cancel_topic == "/bob/move_base/cancel"
     names = [type(module).__name__ for module in bob.modules]
     assert names.count("LaserScanner") == 2
     assert "Battery" in names
@@ -110,7 +110,7 @@ def test_one_fleet_file_describes_robots_of_ros_1_and_ros_2(ready):
 def test_the_fleet_file_sets_limits_for_the_other_axes_of_a_flying_robot(ready):
     limits = "z_max = 0.5\nrx_max = 0.2\nry_max = 1"
     spec = ready(changed("w_max = 1", f"w_max = 1\n{limits}")).robots[0].motion.spec()
-    assert (spec.z_max, spec.rx_max, spec.ry_max) == (0.5, 0.2, 1.0)
+    assert (spec.base.z_max, spec.base.rx_max, spec.base.ry_max) == (0.5, 0.2, 1.0)
 
 
 def test_robots_use_the_only_bridge_by_default_and_a_topic_may_be_plain_text(ready):

@@ -28,9 +28,10 @@ def test_a_robot_gets_its_action_and_initial_pose_from_the_fleet_file(tmp_path):
         'initial_pose = { topic = "/here", covariance = [0.1, 0.2, 0] }\n',
     )
     spec = robot.motion.spec()
-    assert (spec.action, spec.goal_topic) == ("/move_base", None)
-    assert spec.action_type == "move_base_msgs/MoveBaseAction"
-    assert (spec.pose_topic, spec.pose_covariance) == ("/here", (0.1, 0.2, 0.0))
+    assert (spec.navigation.action, spec.navigation.topic) == ("/move_base", "")
+    assert spec.navigation.action_type == "move_base_msgs/MoveBaseAction"
+    pose = spec.initial_pose
+    assert (pose.topic, pose.covariance) == ("/here", (0.1, 0.2, 0.0))
     robot.destroy()
 
 

@@ -5,8 +5,8 @@ import math
 import pytest
 
 from webmap.base.errors import ConfigError
+from webmap.config.motion import StopHook
 from webmap.fleet.fleet_file import prepare
-from webmap.gate.protocol import StopHook
 
 HEAD = """[bridges]
 hall = "ws://hall:9090"
@@ -36,10 +36,10 @@ def test_stop_hooks_of_the_fleet_file_reach_the_gate(tmp_path):
         + 'twist = { topic = "/cmd_vel", stop_hooks = [{ topic = "lock" }, '
         + '{ service = "/e_stop", type = "std_srvs/srv/Trigger" }] }\n',
     )
-    assert spec(ready).stop_hooks == (
+    assert spec(ready).base.stop_hooks == [
         StopHook(topic="/lock", type="std_msgs/Bool"),
         StopHook(service="/e_stop", type="std_srvs/srv/Trigger"),
-    )
+    ]
 
 
 def test_scan_assist_settings_of_the_fleet_file_reach_the_gate(tmp_path):
@@ -51,9 +51,9 @@ def test_scan_assist_settings_of_the_fleet_file_reach_the_gate(tmp_path):
         + 'x = 0.25\nangle = 180\nupside_down = true\nframe = "l"\n'
         + 'blind = "creep"\ncreep = 0\n',
     )
-    assist = spec(ready).assist
+    assist = spec(ready).scan_assist
     assert assist.topic == "/scan"
-    assert assist.footprint == ((0.3, 0.2), (-0.3, 0.0), (0.3, -0.2))
+    assert assist.corners == ((0.3, 0.2), (-0.3, 0.0), (0.3, -0.2))
     assert assist.sensor == pytest.approx((0.25, 0.0, math.pi))
     assert (assist.blind, assist.creep) == ("creep", 0.0)
     assert assist.upside_down
@@ -62,7 +62,7 @@ def test_scan_assist_settings_of_the_fleet_file_reach_the_gate(tmp_path):
 
 def test_a_footprint_may_be_a_radius(tmp_path):
     text = 'scan_assist = { topic = "/scan", footprint = 0.2 }\n'
-    corners = spec(check(tmp_path, DRIVEN + text)).assist.footprint
+    corners = spec(check(tmp_path, DRIVEN + text)).scan_assist.corners
     assert len(corners) > 3
 
 

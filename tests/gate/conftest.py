@@ -5,8 +5,8 @@ from decisions import Decisions
 from gate_page import Page
 from gate_robot import FakeRobot
 
+from equipment.declarations import declared
 from webmap.gate.display.client import GateClient
-from webmap.gate.protocol import RobotSpec
 from webmap.gate.rules.machines import Machines
 
 
@@ -60,7 +60,7 @@ def fake():
 
 @pytest.fixture
 def robot_spec(fake):
-    return RobotSpec(
+    return declared(
         id="r1",
         name="Bob",
         bridge_url=fake.url,

@@ -25,6 +25,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+from webmap.gate.protocol import RobotSpec
 from webmap.gate.rules import stop
 from webmap.gate.rules.gate import Gate
 
@@ -83,6 +84,7 @@ class Decisions:
             self._note(None, now, actions)
             return actions
 
+        monkeypatch.setattr(RobotSpec, "__repr__", _declared)
         monkeypatch.setattr(Gate, "handle", handled)
         monkeypatch.setattr(Gate, "step", stepped)
 
@@ -124,6 +126,14 @@ class Decisions:
                 f"got {self.count} decisions that differ from those recorded: see "
                 f"tests/gate/decisions.py"
             )
+
+
+def _declared(spec: RobotSpec) -> str:
+    """Return a declaration in short: its parts may change, and no decision with them.
+
+    The topics and addresses of a checked one are in the key of its machine.
+    """
+    return f"RobotSpec({spec.id!r}, {spec.name!r})"
 
 
 def text_of(actions: Any) -> str:

@@ -15,7 +15,7 @@ import sys
 import time
 from pathlib import Path
 
-from webmap.gate.protocol import RobotSpec
+from equipment.declarations import declared
 
 FOLDER = Path(__file__).with_name("stored_state")
 
@@ -25,7 +25,7 @@ PORT = 28461
 
 def robot(name, url, topic=None, **more):
     """Return a robot as a display declares one."""
-    return RobotSpec(
+    return declared(
         id=name.lower(), name=name, bridge_url=url, twist_topic=topic, **more
     )
 

@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from webmap.base.geometry import Twist
 from webmap.base.outline import polygon_around
+from webmap.config.motion import ScanAssistConfig
 from webmap.gate.events import Scan
-from webmap.gate.protocol import AssistSpec
 from webmap.gate.rules.assist import assist, free_way, inside, points_of
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
-SPEC = AssistSpec(topic="/scan", footprint=BOX)
+SPEC = ScanAssistConfig(topic="/scan", footprint=BOX)
 BEAMS = 360
 
 
@@ -114,7 +114,7 @@ def test_an_upside_down_scanner_swaps_left_and_right():
 
 
 def test_a_range_of_minus_infinity_is_an_obstacle():
-    spec = AssistSpec(topic="/scan", footprint=BOX, sensor=(0.3, 0.0, 0.0))
+    spec = ScanAssistConfig(topic="/scan", footprint=BOX, x=0.3)
     near = sweep_of(lambda bearing: -math.inf if abs(bearing) < 0.5 else math.inf)
     assert assist(spec, near, Twist(0.2, 0.0, 0.0), 0.1).scale == 0.0
 
@@ -139,7 +139,7 @@ def test_a_robot_without_a_usable_scan_stops_or_creeps_as_configured(sweep, why)
     stop = assist(SPEC, sweep, wanted, 0.1)
     assert stop.scale == 0.0
     assert why in stop.why
-    creeping = AssistSpec(topic="/scan", footprint=BOX, blind="creep")
+    creeping = ScanAssistConfig(topic="/scan", footprint=BOX, blind="creep")
     assert assist(creeping, sweep, wanted, 0.1).scale == pytest.approx(0.2)
     assert assist(creeping, sweep, Twist(0.05, 0.0, 0.0), 0.1).scale == 1.0
 

@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 
 from webmap.base.geometry import Twist
 from webmap.base.outline import polygon_around
+from webmap.config.motion import ScanAssistConfig
 from webmap.gate.events import Scan
 from webmap.gate.lanes.scans import parse_scan
-from webmap.gate.protocol import AssistSpec
 from webmap.gate.rules.assist import FREE, assist, free_way, points_of
 from webmap.gate.rules.scan_geometry import LIMIT, MOST, folded
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
-SPEC = AssistSpec(topic="/scan", footprint=BOX)
+SPEC = ScanAssistConfig(topic="/scan", footprint=BOX)
 AHEAD = Twist(1.0, 0.0, 0.0)
 COUNTS = st.sampled_from([721, 722, 1439, 1440, 1441, 2000, 3600])
 PROFILES = st.lists(
@@ -191,10 +191,12 @@ class TestVerdict:
     def test_leaving_out_distant_points_changes_no_verdict(
         self, profile, count, seed, footprint, sensor, twist, stop, brake
     ):
-        spec = AssistSpec(
+        spec = ScanAssistConfig(
             topic="/scan",
             footprint=footprint,
-            sensor=sensor,
+            x=sensor[0],
+            y=sensor[1],
+            angle=math.degrees(sensor[2]),
             stop_distance=stop,
             brake=brake,
         )
@@ -215,5 +217,5 @@ class TestVerdict:
         sweep = dense(ranges)
         assert len(points_of(SPEC, sweep)) == 300
         assert len(points_of(SPEC, sweep, 2.0)) == 200
-        aside = msgspec.structs.replace(SPEC, sensor=(1.0, 0.0, 0.0))
+        aside = msgspec.structs.replace(SPEC, x=1.0)
         assert 0 < len(points_of(aside, sweep, 2.0)) < 200

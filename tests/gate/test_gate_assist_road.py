@@ -9,11 +9,13 @@ import time
 
 import pytest
 
+from equipment.declarations import declared
 from equipment.waiting import wait_for
 from webmap.base.geometry import Twist
 from webmap.base.outline import polygon_around
+from webmap.config.motion import ScanAssistConfig
 from webmap.gate.display.client import GateClient
-from webmap.gate.protocol import AssistSpec, RobotReport, RobotSpec
+from webmap.gate.protocol import RobotReport
 
 RADIUS = 0.25
 
@@ -62,7 +64,7 @@ def test_scan_assist_stops_a_robot_that_is_driven_towards_a_wall(gate, bridge):
         lambda report: isinstance(report, RobotReport) and newest.update(report=report)
     )
     gate.declare(
-        RobotSpec(
+        declared(
             id="r1",
             name="Bob",
             bridge_url=bridge,
@@ -72,7 +74,9 @@ def test_scan_assist_stops_a_robot_that_is_driven_towards_a_wall(gate, bridge):
             w_max=1.5,
             odometry_topic="/odom",
             odometry_type="nav_msgs/Odometry",
-            assist=AssistSpec(topic="/base_scan", footprint=polygon_around(RADIUS)),
+            assist=ScanAssistConfig(
+                topic="/base_scan", footprint=polygon_around(RADIUS)
+            ),
         )
     )
     wait_for(lambda: "report" in newest and newest["report"].armable, "a link")

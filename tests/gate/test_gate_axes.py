@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from equipment.gate_harness import KEY, ZERO, Bench, spec
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
+from webmap.config.motion import ScanAssistConfig
 from webmap.gate import commands, events, protocol
 from webmap.gate.events import Scan
-from webmap.gate.limits import Axes, Speed, fit, ramp
-from webmap.gate.protocol import PROGRAM, AssistSpec
-from webmap.gate.specs import checked
+from webmap.gate.protocol import PROGRAM
+from webmap.gate.specs import Axes, Speed, checked, fit, ramp
 
 FLYING = {"z_max": 0.5, "rx_max": 0.2, "ry_max": 0.1}
 EVERYTHING = Twist(0.1, 0.2, 0.3, vz=0.4, wx=0.05, wy=-0.06)
@@ -97,7 +97,7 @@ class TestWithoutALimit:
     @pytest.mark.parametrize("field", ["z_max", "rx_max", "ry_max"])
     @pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
     def test_a_limit_that_is_not_positive_and_finite_is_refused(self, field, value):
-        with pytest.raises(ConfigError, match=f"{field} is {value}, expected a number"):
+        with pytest.raises(ConfigError, match=f"{field}: got the number {value}"):
             checked(spec(**{field: value}))
 
     def test_changing_a_limit_ends_the_lease(self):
@@ -182,13 +182,15 @@ class TestWithLimits:
         assert ramp(ZERO, EVERYTHING, 100.0, 0.1) == EVERYTHING
 
     def test_scan_assist_reduces_the_velocity_on_all_axes(self):
-        assist = AssistSpec(topic="/scan", footprint=BOX, blind="creep", creep=0.05)
+        assist = ScanAssistConfig(
+            topic="/scan", footprint=BOX, blind="creep", creep=0.05
+        )
         bench = begin(assist=assist)
         twist(bench, Twist(0.1, vz=0.4, wx=0.02))
         assert bench.written[-1].twist == Twist(0.05, vz=0.2, wx=0.01)
 
     def test_scan_assist_does_not_limit_a_purely_vertical_velocity(self):
-        assist = AssistSpec(topic="/scan", footprint=BOX)
+        assist = ScanAssistConfig(topic="/scan", footprint=BOX)
         bench = begin(assist=assist)
         ranges = [0.4] * 72
         sweep = Scan(-math.pi, math.tau / 72, 0.05, 8.0, ranges, bench.now)

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from equipment.gate_harness import KEY, URL, Bench, spec
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
+from webmap.config.motion import StopHook
 from webmap.gate import actions, events, protocol
 from webmap.gate.disk import Disk, Records, path_of
 from webmap.gate.events import CheckRecord, Key
-from webmap.gate.protocol import StopHook
 from webmap.gate.rules.check import PROVED_FOR, span
 from webmap.gate.specs import checked
 

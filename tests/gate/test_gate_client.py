@@ -4,17 +4,17 @@ import os
 import signal
 import time
 
-import msgspec
 import pytest
 from gate_page import Page
 from gate_robot import FakeRobot
 
+from equipment.declarations import changed, declared
 from equipment.waiting import wait_for
 from webmap.base.errors import ConfigError, MotionError, NoLease
 from webmap.base.geometry import Twist
+from webmap.config.motion import StopHook
 from webmap.gate import protocol
 from webmap.gate.display.client import GateClient
-from webmap.gate.protocol import StopHook
 
 # A gate drives in real time, and waits for most of it.
 pytestmark = [pytest.mark.slow, pytest.mark.serial]
@@ -195,7 +195,7 @@ class TestGoals:
     ):
         with FakeRobot(answers_services=False) as fake:
             client.declare(
-                msgspec.structs.replace(
+                changed(
                     robot_spec,
                     bridge_url=fake.url,
                     goal_topic=None,
@@ -229,7 +229,7 @@ class TestGoals:
     ):
         with FakeRobot() as fake:
             client.declare(
-                msgspec.structs.replace(
+                changed(
                     robot_spec,
                     bridge_url=fake.url,
                     action="/move_base",
@@ -283,9 +283,7 @@ class TestGoals:
     ):
         with FakeRobot() as fake:
             client.declare(
-                msgspec.structs.replace(
-                    robot_spec, bridge_url=fake.url, action="/navigate_to_pose"
-                )
+                changed(robot_spec, bridge_url=fake.url, action="/navigate_to_pose")
             )
             page = Page(client)
             page.take()
@@ -530,7 +528,7 @@ class TestLifecycle:
         second.stop()
 
     def test_declaring_an_invalid_robot_raises_a_config_error(self, client):
-        spec = protocol.RobotSpec(id="r1", name="Bob", bridge_url="ws://x", v_max=-1.0)
+        spec = declared(bridge_url="ws://x", twist_topic="/cmd_vel", v_max=-1.0)
         with pytest.raises(ConfigError):
             client.declare(spec)
 
@@ -640,7 +638,7 @@ class TestActiveStop:
             StopHook(topic="/lock", type="std_msgs/Bool"),
             StopHook(service="/e_stop", type="std_srvs/Trigger"),
         )
-        spec = msgspec.structs.replace(robot_spec, stop_hooks=hooks, action="/go")
+        spec = changed(robot_spec, stop_hooks=hooks, action="/go")
         client.declare(spec)
         page = Page(client)
         wait_for(lambda: page.robot().get("armable"), "a link")
@@ -679,7 +677,7 @@ class TestInputs:
     def test_a_stop_test_measures_the_command_timeout_and_keeps_the_result(
         self, client, robot_spec, fake
     ):
-        spec = msgspec.structs.replace(robot_spec, stops_within=None)
+        spec = changed(robot_spec, stops_within=None)
         client.declare(spec)
         page = Page(client)
         fake.at_rest = True

@@ -16,6 +16,7 @@ from equipment.gate_harness import spec
 from equipment.waiting import until
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Twist
+from webmap.config.motion import StopHook
 from webmap.gate.actions import SendGoal, SendPose
 from webmap.gate.clock import now
 from webmap.gate.events import (
@@ -33,7 +34,6 @@ from webmap.gate.lanes.calls import ServiceCalls
 from webmap.gate.lanes.control import MOST, ControlLane
 from webmap.gate.lanes.odometry import OdometryLane
 from webmap.gate.lanes.tasks import TasksLane, goal_topics, hook_topics
-from webmap.gate.protocol import StopHook
 from webmap.ros.names import web_socket_url
 
 SDK, OLD = "foxglove.sdk.v1", "foxglove.websocket.v1"

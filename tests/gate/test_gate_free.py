@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from equipment.gate_harness import Bench, spec
 from webmap.gate import protocol
 from webmap.gate.display.pages import Pages
-from webmap.gate.limits import Cap, Speed, offered, page_cap, speed_in_force
+from webmap.gate.specs import Cap, Speed, offered, page_cap, speed_in_force
 
 INF = math.inf
 LIMITS = st.sampled_from([0.0, 0.2, 0.3, 0.6, 1.0, INF])

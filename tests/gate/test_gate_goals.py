@@ -836,9 +836,11 @@ class TestInitialPose:
     @pytest.mark.parametrize(
         ("changes", "what"),
         [
-            ({"pose_type": "geometry_msgs/PoseStamped"}, "initial pose is sent as"),
             ({"pose_covariance": (-1.0, 0.0, 0.0)}, "from 0 on"),
-            ({"action": "/go", "action_type": "a/Fib"}, "NavigateToPose or"),
+            (
+                {"action": "/go", "action_type": "a/Fib"},
+                "one of the types nav2_msgs/",
+            ),
         ],
     )
     def test_invalid_pose_and_action_settings_are_refused(self, changes, what):
@@ -884,6 +886,8 @@ class TestGoalsOnly:
         assert bench.report().link == "down"
 
     def test_a_robot_without_velocity_and_goal_topics_cannot_be_taken(self):
-        bench = Bench().begin(spec(twist_topic=None, goal_topic=None))
+        bench = Bench().begin(
+            spec(twist_topic=None, goal_topic=None, pose_topic="/initialpose")
+        )
         assert bench.take() is None
         assert "no velocity topic and no goal topic" in bench.report().reason

@@ -7,14 +7,14 @@ from link_bench import frame, in_loop, noting_bridge, raw_bridge
 
 from equipment.gate_harness import KEY, URL, Bench, spec
 from equipment.waiting import until
+from webmap.config.motion import StopHook
 from webmap.gate import actions, events, protocol
 from webmap.gate.display import pages
 from webmap.gate.lanes import calls, navigation
 from webmap.gate.lanes.calls import RosbridgeCall, ServiceCalls
 from webmap.gate.lanes.links import Links
 from webmap.gate.lanes.navigation import answer_to
-from webmap.gate.limits import Cap
-from webmap.gate.protocol import StopHook
+from webmap.gate.specs import Cap
 
 LOCK = StopHook(topic="/lock", type="std_msgs/Bool")
 E_STOP = StopHook(service="/e_stop", type="std_srvs/Trigger")

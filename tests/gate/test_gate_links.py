@@ -2,9 +2,11 @@
 
 from link_bench import in_loop, noting_bridge
 
+from equipment.declarations import changed
 from equipment.gate_harness import spec
 from equipment.waiting import until
 from webmap.base.geometry import Twist
+from webmap.config.motion import ScanAssistConfig, StopHook
 from webmap.gate import actions
 from webmap.gate.clock import now
 from webmap.gate.events import (
@@ -16,7 +18,6 @@ from webmap.gate.events import (
     TwistWritten,
 )
 from webmap.gate.lanes.links import Links
-from webmap.gate.protocol import AssistSpec, StopHook
 
 SLOW, ZERO = Twist(0.1), Twist()
 MOVING = {"twist": {"twist": {"linear": {"x": 0.5, "y": 0.0}, "angular": {"z": 0.0}}}}
@@ -43,7 +44,7 @@ class Noting:
         return self.links.perform(action)
 
     def attach(self, robot):
-        key = Key(robot.bridge_url, robot.twist_topic or "")
+        key = Key(robot.bridge_url, robot.base.topic)
         assert self.do(actions.Attach(key, robot)) is None
         return key
 
@@ -142,7 +143,7 @@ async def test_odometry_and_goals_may_use_other_bridges_than_velocity():
             odometry_url=b.url,
             goal_url=c.url,
             stop_hooks=(StopHook(topic="/lock", type="std_msgs/Bool"),),
-            assist=AssistSpec(topic="/scan", footprint=((0.1, 0.1), (-0.1, 0.0))),
+            assist=ScanAssistConfig(topic="/scan", footprint=((0.1, 0.1), (-0.1, 0.0))),
         )
         key = noting.attach(robot)
         await noting.up("control", "odometry", "odometry", "tasks", "tasks")
@@ -152,7 +153,7 @@ async def test_odometry_and_goals_may_use_other_bridges_than_velocity():
         await until(lambda: b.of("subscribe", "/odom"), "odometry")
         await until(lambda: len(c.of("advertise")) == 2, "goals")
         assert [t.topic for t in a.of("advertise", "/lock")] == ["/lock"]
-        noting.do(actions.RunHook(key, "r1", robot.stop_hooks[0], True, 1))
+        noting.do(actions.RunHook(key, "r1", robot.base.stop_hooks[0], True, 1))
         await until(lambda: a.of("publish", "/lock"), "the hook")
         noting.do(actions.Watch(key, False))
         await until(lambda: a.of("unsubscribe", "/scan"), "the end of scans")
@@ -199,17 +200,13 @@ async def test_a_new_declaration_ends_only_the_subscriptions_of_a_changed_action
         sent = actions.SendGoal(key, "r1", "g1", 1.0, 2.0, 0.0, "a", "move_base")
         assert noting.do(sent).done
         await until(lambda: bridge.of("publish", "/move_base/goal"), "the goal")
-        noting.attach(spec(**{**_fields(robot), "v_max": 0.2}))
-        noting.attach(spec(**{**_fields(robot), "action": "/other"}))
+        noting.attach(changed(robot, v_max=0.2))
+        noting.attach(changed(robot, action="/other"))
         await until(lambda: bridge.of("unsubscribe", "/move_base/status"), "its end")
         assert len(bridge.of("unsubscribe", "/move_base/status")) == 1
         listening = len(bridge.of("subscribe", "/cmd_vel"))
         ended = len(bridge.of("unsubscribe", "/cmd_vel"))
         assert listening == ended + 1, "the lane subscribes to its echo"
-
-
-def _fields(robot):
-    return {name: getattr(robot, name) for name in robot.__struct_fields__}
 
 
 @in_loop
@@ -239,7 +236,7 @@ async def test_a_cancel_is_still_sent_when_the_goals_move_to_another_bridge():
         await noting.up("control", "tasks")
         await until(lambda: len(old.of("advertise")) == 2, "the topics of goals")
         noting.do(actions.CancelGoals(key, "r1"))
-        noting.attach(spec(**{**_fields(robot), "goal_url": new.url}))
+        noting.attach(changed(robot, goal_url=new.url))
         await noting.links.settle()
         (call,) = old.of("call_service")
         assert call.message["service"] == "/go/_action/cancel_goal"
@@ -263,7 +260,7 @@ async def test_a_new_declaration_does_not_advertise_unchanged_topics_again():
         robot = spec(bridge_url=bridge.url)
         noting.attach(robot)
         await noting.up("control", "tasks")
-        noting.attach(spec(**{**_fields(robot), "goal_topic": "/other"}))
+        noting.attach(changed(robot, goal_topic="/other"))
         await until(lambda: bridge.of("unadvertise", "/goal"), "the end of the old one")
         assert {t.topic for t in bridge.of("unadvertise")} == {"/goal"}
         assert len(bridge.of("advertise", "/cmd_vel")) == 1

@@ -7,9 +7,9 @@ import pytest
 from equipment.gate_harness import KEY, URL, ZERO, Bench, spec
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
+from webmap.config.motion import ScanAssistConfig, StopHook
 from webmap.gate import actions, events, protocol
 from webmap.gate.events import Key
-from webmap.gate.protocol import AssistSpec, StopHook
 from webmap.gate.specs import checked, key_of
 
 
@@ -26,20 +26,20 @@ class TestSpecs:
     def test_a_robot_without_a_velocity_topic_has_its_goal_topic_or_id_as_key(self):
         goal_only = checked(spec(twist_topic=None, goal_url="ws://g:1"))
         assert key_of(goal_only) == Key("ws://g:1", "goal /goal")
-        nothing = spec(twist_topic=None, goal_topic=None)
-        assert key_of(nothing) == Key(URL, "goal robot r1")
+        pose = spec(twist_topic=None, goal_topic=None, pose_topic="/initialpose")
+        assert key_of(pose) == Key(URL, "goal robot r1")
 
     @pytest.mark.parametrize(
         "changes",
         [
             {"id": ""},
+            {"twist_topic": None, "goal_topic": None},
             {"id": "*"},
             {"id": "r" * 65},
             {"id": "r\n"},
             {"bridge_url": "http://robot"},
             {"twist_topic": "not a topic"},
             {"twist_type": "std_msgs/String"},
-            {"goal_type": "geometry_msgs/Pose"},
             {"odometry_type": "Odometry"},
             {"v_max": math.nan},
             {"v_max": -1.0},
@@ -181,7 +181,11 @@ class TestSharedMachine:
         "more",
         [
             {"stop_hooks": (StopHook(topic="/lock", type="std_msgs/Bool"),)},
-            {"assist": AssistSpec(topic="/scan", footprint=((1, 1), (-1, 1), (0, -1)))},
+            {
+                "assist": ScanAssistConfig(
+                    topic="/scan", footprint=((1, 1), (-1, 1), (0, -1))
+                )
+            },
             {"odometry_topic": "/odom"},
             {"stops_within": None},
             {"a_max": 0.5},
@@ -232,7 +236,7 @@ class TestTypes:
         # The other settings of the second robot apply, also later.
         bench.handle(spec(id="r2", name="Al", twist_type=self.STAMPED, v_max=0.2))
         again = bench.did(actions.Attach)[-1].spec
-        assert (again.v_max, again.twist_type_assumed) == (0.2, True)
+        assert (again.base.v_max, again.twist_type_assumed) == (0.2, True)
         bench.send("b", op="stop", robot="r2")
         assert bench.report("r1").latched
 

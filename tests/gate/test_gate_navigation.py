@@ -4,14 +4,14 @@ import json
 
 import pytest
 
+from equipment.declarations import declared
 from webmap.gate import pipe
 from webmap.gate.actions import SendGoal
 from webmap.gate.events import GoalEnded, GoalProgress, Key
 from webmap.gate.lanes import navigation
-from webmap.gate.protocol import RobotSpec
 
 KEY = Key("ws://robot:9090", "/cmd_vel")
-SPEC = RobotSpec(
+SPEC = declared(
     id="r1",
     name="Bob",
     bridge_url=KEY.url,

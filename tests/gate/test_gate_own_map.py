@@ -3,12 +3,12 @@
 import math
 import time
 
-import msgspec
 import pytest
 from gate_page import Page
 from hypothesis import given
 from hypothesis import strategies as st
 
+from equipment.declarations import changed, declared
 from equipment.waiting import wait_for
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Pose
@@ -25,8 +25,7 @@ ANGLE = st.floats(-3.1, 3.1)
 
 
 def robot(**changes) -> RobotSpec:
-    plain = RobotSpec(id="r1", name="Bob", bridge_url="ws://robot:9090")
-    return msgspec.structs.replace(plain, **changes)
+    return declared(goal_topic="/goal", **changes)
 
 
 def goal(x, y, yaw) -> SendGoal:
@@ -62,7 +61,7 @@ def test_an_own_map_with_a_nan_position_raises_config_error():
 def test_a_goal_from_a_page_arrives_in_the_own_map_of_the_robot(
     client, fake, robot_spec
 ):
-    aligned = msgspec.structs.replace(
+    aligned = changed(
         robot_spec, own_map=(10.0, 0.0, QUARTER), pose_topic="/initialpose"
     )
     client.declare(aligned)

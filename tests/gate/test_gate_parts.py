@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from equipment.gate_harness import spec
 from webmap.base.geometry import Twist
 from webmap.gate.commands import Refusal
-from webmap.gate.limits import Cap, Speed, caps_of, fit, ramp, speed_in_force
 from webmap.gate.rules.connections import (
     Connection,
     Epochs,
@@ -23,6 +22,7 @@ from webmap.gate.rules.connections import (
 )
 from webmap.gate.rules.health import DisplayPulse, LinkHealth
 from webmap.gate.rules.motion import DEADMAN, NEUTRAL, DeadMan, ZeroBurst
+from webmap.gate.specs import Cap, Speed, caps_of, fit, ramp, speed_in_force
 
 axis = st.floats(-1e308, 1e308)
 positive = st.floats(0, 1e6)
@@ -121,7 +121,7 @@ class TestLeases:
 
 class TestLimits:
     def in_force(self, *more, **changes):
-        return speed_in_force([*caps_of(spec(**changes)), *more])
+        return speed_in_force([*caps_of(spec(**changes).base), *more])
 
     def test_the_lowest_limits_are_in_force_with_their_reasons(self):
         page = Cap(0.4, 9.0, "normal limit")

@@ -338,7 +338,7 @@ async def test_the_topics_of_a_link_count_for_what_its_bridge_may_send():
             twist_topic=f"/s{number}/cmd_vel",
             odometry_topic=f"/s{number}/odom",
         )
-        machine = Key(robot.bridge_url, robot.twist_topic)
+        machine = Key(robot.bridge_url, robot.base.topic)
         lanes.perform(actions.Attach(machine, robot))
         lanes.perform(actions.Watch(machine, True))
     assert lanes._control["ws://127.0.0.1:1"].lane.budget.topics == 3

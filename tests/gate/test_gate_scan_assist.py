@@ -9,14 +9,14 @@ import pytest
 from equipment.gate_harness import KEY, ZERO, Bench, spec
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
+from webmap.config.motion import ScanAssistConfig
 from webmap.gate import events
 from webmap.gate.events import Scan
-from webmap.gate.protocol import AssistSpec
 from webmap.gate.rules.assist import free_way, points_of
 from webmap.gate.specs import checked
 
 BOX = ((0.3, 0.2), (-0.3, 0.2), (-0.3, -0.2), (0.3, -0.2))
-ASSIST = AssistSpec(topic="/scan", footprint=BOX)
+ASSIST = ScanAssistConfig(topic="/scan", footprint=BOX)
 
 
 @pytest.fixture
@@ -74,7 +74,7 @@ def test_scan_assist_checks_the_ramped_velocity_and_not_the_command():
     """The robot would pass the point on the commanded arc, not on the ramped arc."""
     tail = ((0.3, 0.3), (-0.9, 0.3), (-0.9, -0.3), (0.3, -0.3))
     point = (-0.91, 0.23)
-    about = AssistSpec(topic="/scan", footprint=tail)
+    about = ScanAssistConfig(topic="/scan", footprint=tail)
     bench = Bench().begin(spec(assist=about, v_max=0.5, w_max=1.0, a_max=0.5))
     ranges = [math.hypot(*point)] + [math.inf] * 719
     bearing = math.atan2(point[1], point[0])
@@ -178,22 +178,22 @@ def test_a_scan_for_an_unknown_machine_is_ignored(bench):
 @pytest.mark.parametrize(
     ("changed", "why"),
     [
-        ({"footprint": ((0.0, 0.0), (1.0, 0.0))}, "3 to 100 corners"),
+        ({"footprint": ((0.0, 0.0), (1.0, 0.0))}, "or 3 corners of its outline"),
         ({"footprint": (BOX[0], BOX[2], BOX[1], BOX[3])}, "meets the edge"),
-        ({"footprint": ((math.nan, 0.0), *BOX)}, "finite"),
+        ({"footprint": ((math.nan, 0.0), *BOX)}, "3 corners of its outline"),
         ({"brake": 0.0}, "above 0"),
         ({"stop_distance": -1.0}, "from 0 on"),
-        ({"creep": math.nan}, "finite"),
-        ({"blind": "hope"}, "is 'stop' or 'creep', got 'hope'"),
-        ({"sensor": (math.inf, 0.0, 0.0)}, "finite"),
+        ({"creep": math.nan}, "from 0 on"),
+        ({"blind": "hope"}, 'got the text "hope", expected "stop" or "creep"'),
+        ({"x": math.inf}, "a number of metres"),
     ],
 )
 def test_an_invalid_scan_assist_configuration_raises_config_error(changed, why):
     about = {"topic": "/scan", "footprint": BOX, **changed}
     with pytest.raises(ConfigError, match=why):
-        checked(spec(assist=AssistSpec(**about)))
+        checked(spec(assist=ScanAssistConfig(**about)))
 
 
 def test_the_scan_topic_gets_a_leading_slash():
-    checked_spec = checked(spec(assist=AssistSpec(topic="scan", footprint=BOX)))
-    assert checked_spec.assist.topic == "/scan"
+    checked_spec = checked(spec(assist=ScanAssistConfig(topic="scan", footprint=BOX)))
+    assert checked_spec.scan_assist.topic == "/scan"

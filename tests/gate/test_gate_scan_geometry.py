@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from webmap.base.geometry import Twist
 from webmap.base.outline import polygon_around
+from webmap.config.motion import ScanAssistConfig
 from webmap.gate.events import Scan
-from webmap.gate.protocol import AssistSpec
 from webmap.gate.rules.assist import assist
 from webmap.gate.rules.scan_geometry import ScanDirections, looks_ahead
 
@@ -19,8 +19,10 @@ PART = "scan assist: the scan covers only a part of the path"
 AHEAD = Twist(0.5)
 
 
-def spec(**more):
-    return AssistSpec(**{"topic": "/scan", "footprint": BOX, **more})
+def spec(sensor=(0.0, 0.0, 0.0), **more):
+    x, y, yaw = sensor
+    pose = {"x": x, "y": y, "angle": math.degrees(yaw)}
+    return ScanAssistConfig(**{"topic": "/scan", "footprint": BOX, **pose, **more})
 
 
 def scan(first, last, *, step=1.0):

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from equipment.declarations import declared
 from webmap.base.errors import ProtocolError
 from webmap.base.geometry import Twist
 from webmap.gate.actions import SendGoal, SendPose
 from webmap.gate.events import Key
 from webmap.gate.lanes import rosbridge, serialization
 from webmap.gate.lanes.serialization import MOST_TEXT, serialized, velocity
-from webmap.gate.protocol import RobotSpec
 
 STORES = {
     "cdr": get_typestore(Stores.ROS2_HUMBLE),
@@ -179,13 +179,14 @@ class TestScan:
         assert list(scan.ranges) == []
 
 
-SPEC = RobotSpec(
+SPEC = declared(
     id="r1",
     name="Bob",
     bridge_url="ws://r",
     goal_topic="/goal",
     goal_frame="world",
     action="/move_base",
+    action_type="move_base_msgs/MoveBaseAction",
     pose_topic="/initialpose",
     pose_covariance=(0.1, 0.2, 0.3),
 )

@@ -9,13 +9,13 @@ from link_bench import in_loop, noting_bridge
 
 from equipment.gate_harness import spec
 from equipment.waiting import polls, until
+from webmap.config.motion import StopHook
 from webmap.gate import actions, commands, events, process, protocol
 from webmap.gate.disk import UNKNOWN, Disk, Records, path_of
 from webmap.gate.events import Key, Press
 from webmap.gate.lanes.control import ControlLane
 from webmap.gate.locks import Locks
 from webmap.gate.process import Shell
-from webmap.gate.protocol import StopHook
 
 pytestmark = pytest.mark.slow
 

@@ -7,9 +7,10 @@ import pytest
 from equipment.gate_harness import KEY, URL, ZERO, Bench, spec
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Twist
+from webmap.config.motion import StopHook
 from webmap.gate import actions, commands, events, protocol
 from webmap.gate.events import Key, Press
-from webmap.gate.protocol import PROGRAM, StopHook
+from webmap.gate.protocol import PROGRAM
 from webmap.gate.specs import checked
 
 
@@ -627,11 +628,11 @@ class TestHooks:
         ],
     )
     def test_an_invalid_stop_hook_raises_config_error(self, hook):
-        with pytest.raises(ConfigError, match="stop hook"):
+        with pytest.raises(ConfigError, match=r"stop_hooks\[0\]"):
             checked(spec(stop_hooks=(StopHook(**hook),)))
 
     def test_a_stop_hook_gets_its_default_type_and_full_name(self):
-        (hook,) = checked(spec(stop_hooks=(StopHook(topic="lock"),))).stop_hooks
+        (hook,) = checked(spec(stop_hooks=(StopHook(topic="lock"),))).base.stop_hooks
         assert hook == StopHook(topic="/lock", type="std_msgs/Bool")
 
 

@@ -8,11 +8,11 @@ import asyncio
 import contextlib
 import shutil
 
-import msgspec
 import pytest
 from gate_page import Page
 from stored_robots import FOLDER, IDENTITIES, PORT, ROBOTS, STOPPED, TESTED
 
+from equipment.declarations import changed
 from equipment.waiting import wait_for
 from webmap.gate import actions, events, process
 from webmap.gate.disk import UNKNOWN, Disk, Records
@@ -126,7 +126,7 @@ def test_a_machine_marked_as_driven_gets_a_zero_for_every_name_of_localhost(
 
     async def scenario():
         gate = process.Shell(Outbox(), Locks(stored), Disk(Records(stored)))
-        gate.deliver(msgspec.structs.replace(specs["Driven"], bridge_url=url))
+        gate.deliver(changed(specs["Driven"], bridge_url=url))
         gate.deliver(specs["Untouched"])
         for there in (url, other):
             gate.deliver(events.LinkUp(there, "control"))

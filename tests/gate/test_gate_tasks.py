@@ -7,6 +7,7 @@ from link_bench import in_loop, noting_bridge
 
 from equipment.gate_harness import spec
 from equipment.waiting import until
+from webmap.config.motion import StopHook
 from webmap.gate.actions import SendGoal, SendPose
 from webmap.gate.events import GoalEnded, GoalLost, GoalProgress, Key, LinkDown, LinkUp
 from webmap.gate.lanes import tasks
@@ -16,7 +17,6 @@ from webmap.gate.lanes.tasks import (
     goal_topics,
     hook_topics,
 )
-from webmap.gate.protocol import StopHook
 
 pytestmark = pytest.mark.slow
 

@@ -5,12 +5,12 @@ import pytest
 from equipment.gate_harness import KEY, ZERO, Bench, spec
 from webmap.base.geometry import Twist
 from webmap.gate import actions, events
-from webmap.gate.limits import Speed
 from webmap.gate.protocol import MAY_MOVE
 from webmap.gate.rules.health import Ages
 from webmap.gate.rules.motion import DEADMAN
 from webmap.gate.rules.obedience import Obedience
 from webmap.gate.rules.speeds import LoopAge, governed, reaction
+from webmap.gate.specs import Speed
 
 
 class TestAlarm:

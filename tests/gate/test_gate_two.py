@@ -9,11 +9,11 @@ from gate_page import Page
 
 from equipment.gate_harness import KEY, URL, ZERO, Bench, spec
 from equipment.waiting import wait_for
+from webmap.config.motion import StopHook
 from webmap.gate import actions
 from webmap.gate.disk import Disk, Records
 from webmap.gate.display.client import GateClient
 from webmap.gate.events import Key, LockState, Press, StopFileChanged, StopSaved
-from webmap.gate.protocol import StopHook
 
 ANN, BEN = Press("Ann", "a1"), Press("Ben", "b1")
 IDS = frozenset({"a1", "b1"})

@@ -11,11 +11,11 @@ import json
 import sys
 import threading
 
+from equipment.declarations import declared
 from webmap.agents.gates import Gates
 from webmap.agents.peer import close_peers
 from webmap.base.errors import NoLease
 from webmap.base.geometry import Twist
-from webmap.gate.protocol import RobotSpec
 
 ROBOT = sys.argv[2] if len(sys.argv) > 2 else "r1"
 
@@ -109,7 +109,7 @@ def main() -> None:
     """Follow the orders on standard input until it ends."""
     client = Gates()
     client.start()
-    spec = RobotSpec(
+    spec = declared(
         id=ROBOT,
         name="Bob",
         bridge_url=sys.argv[1],

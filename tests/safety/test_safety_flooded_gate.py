@@ -11,9 +11,9 @@ from safety_bench import pass_time
 from safety_load import helper
 from safety_run import grace
 
+from equipment.declarations import declared
 from equipment.waiting import wait_for
 from webmap.gate.display.client import GateClient
-from webmap.gate.protocol import RobotSpec
 from webmap.testing import Sentinel, WitnessRobot
 
 pytestmark = [pytest.mark.safety, pytest.mark.serial]
@@ -68,7 +68,7 @@ class Page:
 
 
 def spec(id, url):
-    return RobotSpec(
+    return declared(
         id=id,
         name=id,
         bridge_url=url,

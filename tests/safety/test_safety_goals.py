@@ -20,11 +20,12 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from equipment.chromium import watched_tab
+from equipment.declarations import declared
 from equipment.foxglove_actions import ABORTED, CANCELED, Navigation
 from equipment.processes import WEB, reset, running
 from equipment.waiting import wait_for
+from webmap.config.motion import StopHook
 from webmap.gate.display.client import GateClient
-from webmap.gate.protocol import RobotSpec, StopHook
 from webmap.testing import Sentinel, WitnessRobot
 
 pytestmark = [pytest.mark.safety, pytest.mark.serial]
@@ -103,7 +104,7 @@ class Page:
     def __init__(self, **robot):
         self.reports, self.refused = [], []
         self.client = GateClient()
-        self.client.declare(RobotSpec(id="r1", name="Bob", **robot))
+        self.client.declare(declared(id="r1", name="Bob", **robot))
 
     def __enter__(self):
         self.client.start()

@@ -190,10 +190,8 @@ class ButtonConfig(Config, kw_only=True, frozen=True):
             message = "a value is needed, also as the start of a form"
             mistakes.add((*path, "value"), message)
             return
-        try:
+        with mistakes.at((*path, "value")):
             value_kind(self.value)
-        except ConfigError as error:
-            mistakes.add((*path, "value"), str(error))
         if self.form and isinstance(self.value, list):
             mistakes.add((*path, "form"), "there is no form for a list of values")
 

@@ -4,7 +4,8 @@ import difflib
 import math
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import date
 from numbers import Integral, Real
@@ -68,6 +69,14 @@ class Mistakes:
             self.more += 1
         else:
             self.found.append((path, message))
+
+    @contextmanager
+    def at(self, path: KeyPath) -> Iterator[None]:
+        """Add the error of a block under a path; the block ends there."""
+        try:
+            yield
+        except (ConfigError, OSError) as error:
+            self.add(path, str(error))
 
     def take(self, path: KeyPath, others: "Mistakes") -> None:
         """Add the mistakes of a part whose path is ``path``."""

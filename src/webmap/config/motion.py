@@ -1,6 +1,7 @@
 """Everything that moves a robot: velocity, goals, limits, stop hooks, scan assist.
 
-It needs no display, so a process that only moves robots can import it.
+The gate gets a robot in this form too, and reads it with the same checks. It needs no
+display, so a process that only moves robots can import it.
 """
 
 import math
@@ -25,7 +26,22 @@ MOVE_BASE = "move_base_msgs/MoveBaseAction"
 COVARIANCE = (0.25, 0.25, 0.068)
 """RViz's default: half a metre in x and y, and 15 degrees."""
 
-_ACCELERATION = checks.above_zero("metres per second squared")
+LEAST = 1e-3
+"""The least limit of an axis out of the plane and of the acceleration, in SI units."""
+
+_SQUARED = "metres per second squared"
+
+
+def _limit(unit: str) -> checks.Check:
+    """Return a check for a limit that a robot can notice."""
+
+    def check(value: Any) -> float:
+        number = float(checks.above_zero(unit)(value))
+        if number < LEAST:
+            raise ConfigError(f"a number of {unit} from {LEAST:g} on")
+        return number
+
+    return check
 
 
 class TopicConfig(Config, frozen=True):
@@ -63,7 +79,7 @@ _footprint = checks.expecting(
 )
 
 
-class StopHook(Config, kw_only=True, frozen=True):
+class StopHook(Config, kw_only=True, frozen=True, repr_omit_defaults=True):
     """What else is sent over the robot's bridge on STOP."""
 
     example: ClassVar[str] = '{topic = "/lock"} or {service = "/e_stop"}'
@@ -73,6 +89,11 @@ class StopHook(Config, kw_only=True, frozen=True):
     service: Annotated[str, _hook_name] = ""
     """A service of type ``std_srvs/Trigger``, which is called."""
     type: Annotated[str, checks.text] = ""
+
+    @property
+    def name(self) -> str:
+        """The name of the topic or of the service."""
+        return self.topic or self.service
 
     def __post_init__(self) -> None:
         if not self.type:
@@ -103,15 +124,13 @@ class TwistConfig(TopicConfig, kw_only=True, frozen=True):
     """The greatest speed, in any direction."""
     w_max: Annotated[float, checks.from_zero("radians per second")] | None = None
     """The greatest rate of turn, about any axis."""
-    z_max: Annotated[float, checks.above_zero("metres per second")] | None = None
+    z_max: Annotated[float, _limit("metres per second")] | None = None
     """The greatest speed upward and downward; without it the robot takes no ``z``."""
-    rx_max: Annotated[float, checks.above_zero("radians per second")] | None = None
+    rx_max: Annotated[float, _limit("radians per second")] | None = None
     """The greatest rate of turn about the forward axis; without it, no ``rx``."""
-    ry_max: Annotated[float, checks.above_zero("radians per second")] | None = None
+    ry_max: Annotated[float, _limit("radians per second")] | None = None
     """The greatest rate of turn about the left axis; without it, no ``ry``."""
-    a_max: Annotated[float, checks.above_zero("metres per second squared")] | None = (
-        None
-    )
+    a_max: Annotated[float, _limit(_SQUARED)] | None = None
     """The greatest acceleration; it never delays slowing down."""
     check_every: Annotated[float, checks.duration] | None = None
     """Seconds after a check before driving until the next one is due; without it the
@@ -194,7 +213,7 @@ class ScanAssistConfig(Config, kw_only=True, frozen=True):
     """The frame that the scans must have; any if empty."""
     stop_distance: Annotated[float, checks.from_zero("metres")] = 0.15
     """The distance that stays free before the robot."""
-    brake: Annotated[float, _ACCELERATION] = 0.5
+    brake: Annotated[float, checks.above_zero(_SQUARED)] = 0.5
     """The deceleration of the robot."""
     blind: Literal["stop", "creep"] = "stop"
     """Whether the robot stops or creeps while the scan is stale, empty or mostly
@@ -240,3 +259,10 @@ class MotionConfig(Config, kw_only=True, frozen=True):
                 f"goals are sent to {move.bridge} and the initial pose to "
                 f"{pose.bridge}, expected one bridge for both",
             )
+
+
+MOTION = MotionConfig.__struct_fields__
+"""The names of these parts, as in a robot's table."""
+
+WRITING = ("twist", "move", "initial_pose")
+"""The parts that the gate writes for; the first one of a robot sets its bridge."""

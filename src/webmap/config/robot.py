@@ -14,6 +14,7 @@ from webmap.config import checks
 from webmap.config.buttons import ButtonConfig, check_labels
 from webmap.config.checks import KeyPath, Mistakes
 from webmap.config.motion import (
+    MOTION,
     InitialPoseConfig,
     MotionConfig,
     MoveConfig,
@@ -33,9 +34,6 @@ ODOMETRY_TYPES = (
     "geometry_msgs/Pose2D",
 )
 """The message types with a pose."""
-
-MOTION = tuple(MotionConfig.__struct_fields__)
-"""Keys of a robot's table that are parts of its motion."""
 
 LINKED = ("odometry", "tf", "twist", "move", "initial_pose")
 """Keys of the parts that use a bridge."""

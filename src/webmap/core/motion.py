@@ -17,18 +17,17 @@ from webmap.base.tasks import spawn
 from webmap.config.checks import Mistakes, same_name
 from webmap.config.motion import (
     TWIST_TYPES,
+    WRITING,
     InitialPoseConfig,
     MotionConfig,
     MoveConfig,
-    ScanAssistConfig,
     TwistConfig,
 )
 from webmap.config.reading import Config
 from webmap.core.robot_names import named_robots
-from webmap.gate.limits import PLANE, Axes
-from webmap.gate.protocol import AssistSpec, RobotReport, RobotSpec, StopHook
+from webmap.gate.protocol import RobotReport, RobotSpec
 from webmap.gate.rules.obedience import MOST_NAME, MOST_NODES
-from webmap.gate.specs import checked
+from webmap.gate.specs import PLANE, axes_of, resolved
 from webmap.poses.odometry import TypeQuery
 from webmap.ros.bridge import Bridge
 from webmap.ros.motion_topics import STOP
@@ -42,9 +41,6 @@ log = logging.getLogger("webmap.robot")
 
 ASK_WRITERS = 10.0
 """Seconds between two queries of a bridge for other publishers of velocities."""
-
-WRITING = ("twist", "move", "initial_pose")
-"""The parts that the gate writes for; the first one of a robot sets its bridge."""
 
 PartBridges: TypeAlias = dict[str, Bridge | None]
 """The bridge of each part."""
@@ -114,12 +110,6 @@ def shown_name(name: str, agent: str) -> str:
     return f"{name} ({agent})"
 
 
-def _axes(twist: TwistConfig | None) -> Axes:
-    if twist is None:
-        return PLANE
-    return Axes(twist.z_max or 0.0, twist.rx_max or 0.0, twist.ry_max or 0.0)
-
-
 class RobotMotion:
     """The gate's description of one robot, updated as topics change.
 
@@ -185,7 +175,7 @@ class RobotMotion:
                 bridge.protect(topic, carried)
         self.config, self._bridges = config, bridges
         if key == "twist":
-            self.axes = _axes(config.twist)
+            self.axes = axes_of([config.twist]) if config.twist else PLANE
             self._ask_type(config.twist, bridge)
         self.declare()
 
@@ -257,47 +247,28 @@ class RobotMotion:
         mistakes.refuse(f"robot {self._name!r}")
         spec = self._spec(config, bridges)
         if spec is not None:
-            checked(spec)
+            resolved(spec)
 
     def _spec(self, config: MotionConfig, bridges: "PartBridges") -> RobotSpec | None:
-        twist, move, pose = config.twist, config.move, config.initial_pose
-        first = next((key for key in WRITING if getattr(config, key) is not None), None)
-        link = None if first is None else bridges[first]
-        if link is None:
+        parts, odometry = structs.asdict(config), self._odometry
+        first = next((key for key in WRITING if parts[key] is not None), None)
+        if first is None or bridges[first] is None:
             return None
-        driven: dict[str, Any] = {}
-        if twist is not None:
-            hooks = (StopHook(**structs.asdict(hook)) for hook in twist.stop_hooks)
-            driven = _same_fields(twist, RobotSpec)
-            driven |= {"twist_topic": twist.topic, "stop_hooks": tuple(hooks)}
-            if config.scan_assist is not None:
-                driven["assist"] = _assist(config.scan_assist)
-        goals: dict[str, Any] = {}
-        if move is not None:
-            goals = _same_fields(move, RobotSpec)
-            goals["goal_topic"] = move.topic or None
-            goals["goal_type"] = _goal_type(move, "PoseStamped")
-        if pose is not None:
-            goals["pose_topic"] = pose.topic
-            goals["pose_covariance"] = pose.covariance
-            goals["pose_type"] = _goal_type(move, "PoseWithCovarianceStamped")
-        goal_part = move or pose
-        if goal_part is not None:
-            goals |= {"goal_url": goal_part.bridge, "goal_frame": goal_part.frame}
-        odometry = self._odometry
+        twist = config.twist
+        if twist is None:
+            parts["scan_assist"] = None
+        elif twist.type is None:
+            parts["twist"] = structs.replace(twist, type=TWIST_TYPES[0])
         return RobotSpec(
+            **parts,
             id=self.id,
             name=shown_name(self._name, self.agent),
-            bridge_url=link.url,
-            twist_type=(twist.type if twist else None) or TWIST_TYPES[0],
             base_frame=self.base_frame,
             twist_type_assumed=twist is not None and twist.type is None,
             odometry_url=odometry[0].url if odometry else None,
             odometry_topic=odometry[1] if odometry else None,
             odometry_type=odometry[2] if odometry else None,
             own_map=(self._own_map.x, self._own_map.y, self._own_map.yaw),
-            **driven,
-            **goals,
         )
 
     def writes(self, url: str) -> dict[str, str]:
@@ -390,24 +361,6 @@ def _written(part: object) -> dict[str, str]:
         case InitialPoseConfig():
             return {part.topic: "an initial pose"}
     return {}
-
-
-def _goal_type(move: MoveConfig | None, name: str) -> str:
-    """Return a type of ``geometry_msgs`` in the form of the action's ROS version."""
-    ros2 = move is not None and move.action and "/action/" in move.action_type
-    return f"geometry_msgs/msg/{name}" if ros2 else f"geometry_msgs/{name}"
-
-
-def _same_fields(part: Config, spec: type[msgspec.Struct]) -> dict[str, Any]:
-    """Return the fields of a part that the gate has under the same names."""
-    names = set(part.__struct_fields__) & set(spec.__struct_fields__)
-    return {name: getattr(part, name) for name in names}
-
-
-def _assist(config: ScanAssistConfig) -> AssistSpec:
-    """Return the gate's form of scan assist: a radius becomes corners."""
-    same = _same_fields(config, AssistSpec)
-    return AssistSpec(**{**same, "footprint": config.corners}, sensor=config.sensor)
 
 
 robot_motions: set[RobotMotion] = set()

@@ -18,9 +18,9 @@ from typing import (
 from webmap.base.errors import ConfigError, MotionError
 from webmap.base.geometry import Orientation, Position, Quaternion, Twist
 from webmap.base.scope import no_scope
-from webmap.config.motion import COVARIANCE, NAVIGATE_TO_POSE
+from webmap.config.motion import COVARIANCE, MOTION, NAVIGATE_TO_POSE
 from webmap.config.reading import read_key
-from webmap.config.robot import LINKED, MOTION, RobotConfig
+from webmap.config.robot import LINKED, RobotConfig
 from webmap.core.extendable import Extendable
 from webmap.core.module_arguments import WrongArguments, check_arguments
 from webmap.core.motion import RobotMotion

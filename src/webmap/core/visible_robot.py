@@ -11,7 +11,8 @@ from typing import Any
 from webmap.base.audience import audience
 from webmap.base.geometry import Pose, Quaternion, Twist, Vector3
 from webmap.base.scope import Removal, keep
-from webmap.config.robot import BATTERY_LOW, MOTION, OdometryConfig, TfConfig
+from webmap.config.motion import MOTION
+from webmap.config.robot import BATTERY_LOW, OdometryConfig, TfConfig
 from webmap.core.movable_robot import MovableRobot, sets_part
 from webmap.core.pose_source import PoseSource
 from webmap.core.problems import Problems

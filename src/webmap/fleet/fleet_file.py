@@ -194,10 +194,8 @@ def _map_file(
     name, *others = [options.pop("file")] if "file" in options else module.args
     inner: KeyPath = ("options", "file") if "file" in module.options else ("args", 0)
     file = (folder / name).absolute()
-    try:
+    with mistakes.at((*path, *inner)):
         read_map(file)
-    except (ConfigError, OSError) as error:
-        mistakes.add((*path, *inner), str(error))
     return (str(file), *others), options
 
 
@@ -257,10 +255,8 @@ def check_floor(floor: Path, mistakes: Mistakes) -> None:
             "its position",
         )
         return
-    try:
+    with mistakes.at(("floor",)):
         read_map(floor)
-    except (ConfigError, OSError) as error:
-        mistakes.add(("floor",), str(error))
 
 
 def check_images(
@@ -270,13 +266,10 @@ def check_images(
     found = []
     for index, image in enumerate(images):
         file = folder / image.file
-        try:
+        with mistakes.at(("image", index, "file")):
             picture_file(file)
-        except (ConfigError, OSError) as error:
-            mistakes.add(("image", index, "file"), str(error))
-            continue
-        sides = (image.x, image.y, image.width, image.height)
-        found.append((str(file.absolute()), *sides))
+            sides = (image.x, image.y, image.width, image.height)
+            found.append((str(file.absolute()), *sides))
     return found
 
 
@@ -292,12 +285,9 @@ def publish_picture(
         mistakes: Receives the mistakes; there is no URL then.
 
     """
-    try:
-        data, media_type = picture_file(folder / picture.file)
-    except (ConfigError, OSError) as error:
-        mistakes.add((*path, "file"), str(error))
-        return ""
-    return pictures.publish(data, media_type)
+    with mistakes.at((*path, "file")):
+        return pictures.publish(*picture_file(folder / picture.file))
+    return ""
 
 
 def label_options(places: Any, folder: Path, mistakes: Mistakes) -> dict[str, Any]:
@@ -313,10 +303,8 @@ def label_options(places: Any, folder: Path, mistakes: Mistakes) -> dict[str, An
         read_labels(places, ("labels",), mistakes)
         return {"labels": places}
     file = folder / places
-    try:
+    with mistakes.at(("labels",)):
         label_file(file)
-    except ConfigError as error:
-        mistakes.add(("labels",), str(error))
     return {"file": str(file.absolute())}
 
 
@@ -326,15 +314,12 @@ def tile_options(
     """Return the arguments of ``TileLayer``; note missing tiles."""
     options = msgspec.to_builtins(tiles)
     source = options.pop("source")
-    try:
-        datum = (options.pop("latitude"), options.pop("longitude"))
+    datum = (options.pop("latitude"), options.pop("longitude"))
+    with mistakes.at(("tiles", "source")):
         LocalPlane(*datum, options.get("east", 0.0))
         # A source with a host is refused as written, before it is used as a path.
         found = open_tiles(source if "://" in source else folder / source)
         close = getattr(found, "close", None)
         if close is not None:
             close()
-    except ConfigError as error:
-        mistakes.add(("tiles", "source"), str(error))
-        return {}
     return {"source": str((folder / source).absolute()), "datum": datum, **options}

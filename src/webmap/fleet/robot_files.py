@@ -8,7 +8,7 @@ names.
 import hashlib
 import io
 import re
-from collections.abc import Container, Mapping
+from collections.abc import Callable, Container, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from webmap.config.buttons import read_buttons
 from webmap.config.checks import KeyPath, Mistakes
 from webmap.config.fleet import FleetConfig
 from webmap.config.robot import (
+    CameraConfig,
     ModuleConfig,
     PictureConfig,
     RobotConfig,
@@ -105,16 +106,13 @@ def load_pictures(
         picture = config.picture
         if picture is not None:
             file = folder / picture.file
-            try:
+            with mistakes.at(("robots", index, "picture", "file")):
                 data, media_type = picture_file(file)
                 check_agent_picture(file, data, media_type)
-            except (ConfigError, OSError) as error:
-                mistakes.add(("robots", index, "picture", "file"), str(error))
-            else:
                 name = hashlib.sha256(data).hexdigest()[:32] + file.suffix.lower()
                 pictures[name] = data
                 picture = msgspec.structs.replace(picture, file=name)
-                config = msgspec.structs.replace(config, picture=picture)
+                config = config.with_part("picture", picture)
         loaded.append(config)
     return loaded, pictures
 
@@ -157,13 +155,18 @@ def is_picture_name(name: str) -> bool:
 
 def config_for_displays(config: RobotConfig) -> RobotConfig:
     """Return what displays get of a robot: addresses of cameras without secrets."""
+    return _with_addresses(config, lambda each: parse_address(each.url).shown)
+
+
+def _with_addresses(
+    config: RobotConfig, address: Callable[[CameraConfig], str]
+) -> RobotConfig:
+    """Return a robot with other addresses of its cameras, which all have names."""
     cameras = [
-        msgspec.structs.replace(each, url=parse_address(each.url).shown)
-        if each.url
-        else each
+        msgspec.structs.replace(each, url=address(each)) if each.url else each
         for each in named_cameras(config.cameras)
     ]
-    return msgspec.structs.replace(config, cameras=cameras)
+    return config.with_part("cameras", cameras)
 
 
 def button_actions(config: RobotConfig) -> list[dict[str, str]]:
@@ -228,16 +231,10 @@ def config_from_agent(
     picture = config.picture
     if picture is not None and not is_picture_name(picture.file):
         raise ConfigError(f"{picture.file!r} is not a picture of the agent")
-    cameras = [
-        msgspec.structs.replace(
-            each, url=RemoteCamera(agent, id, each.name, each.url).url
-        )
-        if each.url
-        else each
-        for each in named_cameras(config.cameras)
-    ]
-    shown = msgspec.structs.replace(config, cameras=cameras, picture=None)
-    return shown, picture
+    shown = _with_addresses(
+        config, lambda each: RemoteCamera(agent, id, each.name, each.url).url
+    )
+    return shown.with_part("picture", None), picture
 
 
 def picture_file(file: Path) -> tuple[bytes, str]:

@@ -5,8 +5,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from webmap.base.geometry import Twist
+from webmap.config.motion import StopHook
 from webmap.gate.events import Key, Press
-from webmap.gate.protocol import FromGate, GoalMethod, RobotSpec, StopHook
+from webmap.gate.protocol import FromGate, GoalMethod, RobotSpec
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,8 @@ from typing import Literal, NamedTuple
 import msgspec
 
 from webmap.base.geometry import Twist
-from webmap.gate.protocol import Identity, StopHook
+from webmap.config.motion import StopHook
+from webmap.gate.protocol import Identity
 
 Lane = Literal["control", "odometry", "tasks"]
 Outcome = Literal["reached", "failed", "cancelled"]

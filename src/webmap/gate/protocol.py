@@ -9,8 +9,14 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from webmap.base.outline import Point
 from webmap.base.roles import Role
+from webmap.config.motion import (
+    TWIST_TYPES,
+    InitialPoseConfig,
+    MotionConfig,
+    MoveConfig,
+    TwistConfig,
+)
 from webmap.gate.commands import ProgramCommand, Velocity
 
 PROGRAM = "program"
@@ -37,124 +43,74 @@ GoalMethod = Literal["topic", "navigate_to_pose", "move_base"]
 ROS 1."""
 
 
-class AssistSpec(msgspec.Struct, frozen=True, kw_only=True):
-    """What scan assist needs to know of a robot."""
-
-    topic: str
-    """The topic of its ``sensor_msgs/LaserScan``."""
-    footprint: tuple[Point, ...]
-    """The corners of the robot in its own frame, in order, in metres."""
-    sensor: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """The pose of the scanner on the robot: x, y in metres, yaw in radians."""
-    upside_down: bool = False
-    """Whether the scanner is mounted upside down, so that its rays run clockwise."""
-    frame: str = ""
-    """The frame that its scans must name, without a leading slash; "" for any."""
-    stop_distance: float = 0.15
-    """The distance to keep free before the robot, in metres."""
-    brake: float = 0.5
-    """The deceleration of the robot, in m/s²."""
-    blind: Literal["stop", "creep"] = "stop"
-    """What the robot does while the scan is old, empty or mostly unknown."""
-    creep: float = 0.1
-    """The speed of creeping, in m/s."""
+_NO_BASE = TwistConfig(topic="")
+_NO_NAVIGATION = MoveConfig()
 
 
-class StopHook(
-    msgspec.Struct,
-    frozen=True,
-    kw_only=True,
-    omit_defaults=True,
-    repr_omit_defaults=True,
-):
-    """What else is sent to a robot's bridge on STOP: a topic or a service."""
-
-    topic: str = ""
-    """A topic of type ``std_msgs/Bool``: true is published, and false on reset."""
-    service: str = ""
-    """A service of type ``std_srvs/Trigger``, which is called."""
-    type: str = ""
-    """The type, in either dialect; that of ROS 1 if empty."""
-
-    @property
-    def name(self) -> str:
-        """The name of the topic or of the service."""
-        return self.topic or self.service
-
-
-class RobotSpec(
-    msgspec.Struct, frozen=True, kw_only=True, tag="declare", omit_defaults=True
-):
+class RobotSpec(MotionConfig, kw_only=True, frozen=True, tag="declare"):
     """The declaration of a robot. Sent again, it replaces the earlier declaration.
 
-    If bridge and velocity topic stay the same and any other value changes, the lease
-    on the robot ends.
+    It has the parts of a robot's configuration that move it, each with the address of
+    its bridge. If bridge and velocity topic stay the same and any other value changes,
+    the lease on the robot ends.
     """
 
     id: str
     name: str
     """A label for people; need not be unique."""
-    bridge_url: str
-    """The rosbridge that velocity goes to."""
-    twist_topic: str | None = None
-    twist_type: str = "geometry_msgs/Twist"
-    """Twist or TwistStamped, in either dialect; the stamp sent is zero."""
     base_frame: str = ""
     """The robot's own frame, which a TwistStamped names."""
     twist_type_assumed: bool = False
-    """Whether that type is a default: a type that another robot states overrides it."""
-    holonomic: bool = False
-    """Whether the base can move sideways."""
-    stops_within: float | None = None
-    """Seconds after the last command until the base stops by itself, if known."""
-    v_max: float | None = None
-    """The highest speed in m/s, whatever the direction."""
-    w_max: float | None = None
-    """The highest rate of turn in rad/s, whatever the axis."""
-    z_max: float | None = None
-    """The highest speed upward and downward, in m/s. Without it the robot takes no
-    velocity with a z part."""
-    rx_max: float | None = None
-    """The highest rate of turn about the forward axis, in rad/s; likewise."""
-    ry_max: float | None = None
-    """The highest rate of turn about the left axis, in rad/s; likewise."""
-    a_max: float | None = None
-    """Greatest growth of the speed, in m/s²; slowing down is never limited."""
-    check_every: float | None = None
-    """Seconds after a check before driving until the next one is due, if one is
-    demanded. Without it the robot drives slowly."""
+    """Whether the type of its velocity is a default: a type that another robot states
+    overrides it."""
     odometry_topic: str | None = None
     odometry_type: str | None = None
     odometry_url: str | None = None
     """The bridge of the odometry, if it is a different one."""
-    goal_topic: str | None = None
-    goal_url: str | None = None
-    """The bridge of goals and cancels, if it is a different one."""
-    goal_type: str = "geometry_msgs/PoseStamped"
-    goal_frame: str = "map"
-    cancel_topic: str | None = None
-    """Where an empty ``actionlib_msgs/GoalID`` cancels every goal."""
-    action: str | None = None
-    """An action of the type below, which receives the goals and their cancels. The
-    ``goal_topic`` is then for bridges that do not support action goals."""
-    action_type: str = "nav2_msgs/action/NavigateToPose"
-    """``NavigateToPose`` of ``nav2_msgs``, or ``move_base_msgs/MoveBaseAction``."""
-    on_operator_loss: Literal["continue", "cancel"] = "continue"
-    """What happens to a goal when the page (or program) that sent it is lost."""
-    pose_topic: str | None = None
-    """The topic of the initial pose, a ``PoseWithCovarianceStamped``; on the bridge of
-    the goals, in their frame."""
-    pose_type: str = "geometry_msgs/PoseWithCovarianceStamped"
-    pose_covariance: tuple[float, float, float] = (0.25, 0.25, 0.068)
-    """The variances of the initial pose: x and y in m², yaw in rad²."""
     own_map: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """The origin of its goal frame on the common map: metres and radians. Goals and
     poses arrive on the common map, and are sent to the robot in its own map."""
-    drive_without_proof: bool = False
-    """Whether it may be moved through a bridge that does not show what has arrived."""
-    assist: AssistSpec | None = None
-    """The scan assist of the robot; ``None`` is off."""
-    stop_hooks: tuple[StopHook, ...] = ()
+
+    @property
+    def base(self) -> TwistConfig:
+        """Where velocity goes, and the limits; empty if the robot takes no velocity."""
+        return self.twist or _NO_BASE
+
+    @property
+    def twist_type(self) -> str:
+        """The type of its velocity."""
+        return self.base.type or TWIST_TYPES[0]
+
+    @property
+    def navigation(self) -> MoveConfig:
+        """Where goals go; empty if the robot takes none."""
+        return self.move or _NO_NAVIGATION
+
+    @property
+    def goal_part(self) -> MoveConfig | InitialPoseConfig | None:
+        """The part with the bridge and the frame of goals and of the initial pose."""
+        return self.move or self.initial_pose
+
+    @property
+    def bridge_url(self) -> str:
+        """The bridge that velocity goes to, or else goals; empty if nothing does."""
+        part = self.twist or self.goal_part
+        return "" if part is None else part.bridge
+
+    @property
+    def goal_url(self) -> str:
+        """The bridge of goals, cancels and the initial pose."""
+        return self.bridge_url if self.goal_part is None else self.goal_part.bridge
+
+    @property
+    def goal_frame(self) -> str:
+        """The frame of goals and of the initial pose."""
+        return "map" if self.goal_part is None else self.goal_part.frame
+
+    def goal_type(self, name: str) -> str:
+        """Return a type of ``geometry_msgs`` in the form of the action's dialect."""
+        ros2 = self.navigation.action and "/action/" in self.navigation.action_type
+        return f"geometry_msgs/msg/{name}" if ros2 else f"geometry_msgs/{name}"
 
 
 class Forget(msgspec.Struct, frozen=True, tag="forget"):

@@ -1,17 +1,26 @@
-"""Checks the declaration of a robot, and puts its names in one form."""
+"""The declaration of a robot: its check, its machine, and its speed limits.
+
+:mod:`webmap.config` has the checks of its parts: the gate makes them again, because it
+trusts no message. Every limit is a :class:`Cap`; the least cap is in force. A further
+reason (latency, scan assist) is one more cap in the list.
+"""
 
 import math
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import msgspec
+from msgspec import structs
 
 from webmap.base.errors import ConfigError
-from webmap.base.outline import why_no_outline
-from webmap.gate.protocol import AssistSpec, RobotSpec, StopHook
+from webmap.base.geometry import Twist
+from webmap.config.checks import Mistakes
+from webmap.config.motion import MOTION, WRITING, MotionConfig, TwistConfig
+from webmap.config.reading import read
+from webmap.gate.protocol import RobotSpec
 from webmap.ros.names import (
     has_gate,
-    is_type,
     normalise_topic,
     normalise_url,
     same_type,
@@ -19,50 +28,28 @@ from webmap.ros.names import (
 )
 
 if TYPE_CHECKING:
-    from webmap.gate.events import Key
+    from webmap.gate.events import Key, StopRecord
 
+Vector = tuple[float, float, float]
 
-TYPES = {
-    "twist_topic": ("geometry_msgs/Twist", "geometry_msgs/TwistStamped"),
-    "goal_topic": ("geometry_msgs/PoseStamped",),
-    "action": ("nav2_msgs/NavigateToPose", "move_base_msgs/MoveBaseAction"),
-    "pose_topic": ("geometry_msgs/PoseWithCovarianceStamped",),
-}
-"""The types that a topic or an action may have which is written to."""
+SLOW_V = 0.3
+"""The slow speed in m/s: without a stated limit or without a verified stop (S9)."""
 
-SENT = {
-    "twist_topic": "velocity is sent as",
-    "goal_topic": "goals are sent as",
-    "action": "goals are sent to actions of type",
-    "pose_topic": "its initial pose is sent as",
-}
-"""What is sent to them, for errors."""
+SLOW_W = 0.6
+"""The slow rate of turn in rad/s: without a stated limit or a verified stop (S9)."""
 
-LEAST = {
-    "v_max": 0.0,
-    "w_max": 0.0,
-    "z_max": 1e-3,
-    "rx_max": 1e-3,
-    "ry_max": 1e-3,
-    "a_max": 1e-3,
-    "check_every": 1.0,
-    "stops_within": 0.0,
-}
-"""The least value of each number that a robot may have."""
+STOPS_WITHIN = 0.5
+"""The longest command timeout of a base, in seconds, for more than slow speed (S12)."""
 
-TOPICS = (
-    "twist_topic",
-    "odometry_topic",
-    "goal_topic",
-    "cancel_topic",
-    "action",
-    "pose_topic",
-)
-"""The fields with the name of a topic or an action."""
+ERROR = 0.15
+"""The most seconds that a stop test may measure too long: odometry at 10 Hz, and 50 ms
+to the base and back."""
 
 
 def checked(spec: RobotSpec) -> RobotSpec:
     """Return ``spec`` with its addresses and topics resolved.
+
+    Its parts are read as those of a fleet file are, with every check of their values.
 
     Raises:
         ConfigError: If a value is invalid.
@@ -70,101 +57,59 @@ def checked(spec: RobotSpec) -> RobotSpec:
     """
     if not spec.id or len(spec.id) > 64 or not spec.id.isprintable() or spec.id == "*":
         raise ConfigError(f"a robot's id is a short plain text, got {spec.id!r}")
+    mistakes = Mistakes()
+    given = {key: msgspec.to_builtins(getattr(spec, key)) for key in MOTION}
+    motion = read(MotionConfig, given, (), mistakes)
+    mistakes.refuse(f"robot {spec.name!r}")
+    assert motion is not None, "it is a table"
+    return resolved(structs.replace(spec, **structs.asdict(motion)))
+
+
+def resolved(spec: RobotSpec) -> RobotSpec:
+    """Return ``spec`` with its addresses resolved; its parts are valid.
+
+    Raises:
+        ConfigError: If the gate cannot move robots behind an address, or another value
+            is invalid.
+
+    """
     try:
-        return _checked(spec)
+        return _resolved(spec)
     except ConfigError as error:
         raise ConfigError(f"robot {spec.name!r}: {error}") from None
 
 
-def _checked(spec: RobotSpec) -> RobotSpec:
-    for place, types in TYPES.items():
-        got = getattr(spec, place.removesuffix("_topic") + "_type")
-        if getattr(spec, place) and not is_type(got, *types):
-            raise ConfigError(f"{SENT[place]} {' or '.join(types)}, got {got!r}")
-    if not all(math.isfinite(v) and v >= 0 for v in spec.pose_covariance):
-        raise ConfigError(
-            "the covariance of its initial pose is made of numbers from 0 on, got "
-            f"{spec.pose_covariance}"
-        )
+def _resolved(spec: RobotSpec) -> RobotSpec:
     if not all(map(math.isfinite, spec.own_map)):
         raise ConfigError(
             f"its own map lies on the common one by finite numbers, got {spec.own_map}"
         )
     if spec.odometry_type:
         split_type(spec.odometry_type)
-    url = normalise_url(spec.bridge_url)
-    for each in (url, spec.goal_url or url):
-        if not has_gate(each):
-            raise ConfigError(
-                f"the gate cannot move robots behind {each}; they can only be watched"
-            )
-    numbers = {}
-    for field, least in LEAST.items():
-        number = getattr(spec, field)
-        if number is not None:
-            numbers[field] = float(number)
-            if not least <= number < math.inf:
-                expected = f"expected a number from {least:g} on"
-                raise ConfigError(f"{field} is {number}, {expected}")
-    topics = {field: getattr(spec, field) for field in TOPICS}
-    return msgspec.structs.replace(
+    parts: dict[str, Any] = {}
+    for key in WRITING:
+        part = getattr(spec, key)
+        if part is not None:
+            url = normalise_url(part.bridge)
+            if not has_gate(url):
+                raise ConfigError(
+                    f"the gate cannot move robots behind {url}; they can only be "
+                    "watched"
+                )
+            parts[key] = structs.replace(part, bridge=url)
+    if not parts:
+        raise ConfigError(
+            f"nothing moves it: expected one of the parts {', '.join(WRITING)}"
+        )
+    if spec.scan_assist is not None:  # a radius becomes corners, once
+        corners = list(spec.scan_assist.corners)
+        parts["scan_assist"] = structs.replace(spec.scan_assist, footprint=corners)
+    spec = structs.replace(spec, **parts)
+    odometry = spec.odometry_url, spec.odometry_topic
+    return structs.replace(
         spec,
-        bridge_url=url,
-        odometry_url=normalise_url(spec.odometry_url) if spec.odometry_url else url,
-        goal_url=normalise_url(spec.goal_url) if spec.goal_url else url,
-        **numbers,
-        **{key: normalise_topic(v) if v else None for key, v in topics.items()},
-        assist=spec.assist and _checked_assist(spec.assist),
-        stop_hooks=tuple(_checked_hook(h, spec.twist_topic) for h in spec.stop_hooks),
-    )
-
-
-def _checked_hook(hook: StopHook, twist_topic: str | None) -> StopHook:
-    """Return a stop hook with its name resolved; it never writes to ``twist_topic``."""
-    if bool(hook.topic) == bool(hook.service):
-        raise ConfigError(f"a stop hook has either a topic or a service, got {hook}")
-    place, type = "service", "std_srvs/Trigger"
-    if hook.topic:
-        place, type = "topic", "std_msgs/Bool"
-    if hook.type and not is_type(hook.type, type):
-        raise ConfigError(
-            f"the {place} of a stop hook is of type {type}, got {hook.type!r}"
-        )
-    resolved = normalise_topic(hook.name)
-    if twist_topic and resolved == normalise_topic(twist_topic):
-        raise ConfigError(
-            f"{resolved} is the velocity topic, which cannot be a stop hook"
-        )
-    return StopHook(**{place: resolved, "type": hook.type or type})
-
-
-def _checked_assist(assist: AssistSpec) -> AssistSpec:
-    """Return scan assist with its topic resolved."""
-    numbers = [n for corner in assist.footprint for n in corner]
-    numbers += [*assist.sensor, assist.stop_distance, assist.brake, assist.creep]
-    if not all(map(math.isfinite, numbers)):
-        raise ConfigError("scan assist needs finite numbers")
-    if why := why_no_outline(assist.footprint):
-        raise ConfigError(f"the footprint for scan assist: {why}")
-    if assist.stop_distance < 0 or assist.brake <= 0 or assist.creep < 0:
-        raise ConfigError(
-            "scan assist needs a stop distance and a creep speed from 0 on, and a "
-            "brake above 0"
-        )
-    if assist.blind not in ("stop", "creep"):
-        raise ConfigError(
-            "what a robot does without a usable scan is 'stop' or 'creep', got "
-            f"{assist.blind!r}"
-        )
-    x, y, yaw = map(float, assist.sensor)
-    return msgspec.structs.replace(
-        assist,
-        topic=normalise_topic(assist.topic),
-        footprint=tuple((float(x), float(y)) for x, y in assist.footprint),
-        sensor=(x, y, yaw),
-        stop_distance=float(assist.stop_distance),
-        brake=float(assist.brake),
-        creep=float(assist.creep),
+        odometry_url=normalise_url(odometry[0]) if odometry[0] else spec.bridge_url,
+        odometry_topic=normalise_topic(odometry[1]) if odometry[1] else None,
     )
 
 
@@ -175,7 +120,7 @@ def check_twist_type(spec: RobotSpec, others: Iterable[RobotSpec]) -> None:
         ConfigError: If another robot states another type for that topic.
 
     """
-    if spec.twist_topic is None or spec.twist_type_assumed:
+    if spec.twist is None or spec.twist_type_assumed:
         return
     for other in others:
         if (
@@ -185,7 +130,7 @@ def check_twist_type(spec: RobotSpec, others: Iterable[RobotSpec]) -> None:
             and not same_type(other.twist_type, spec.twist_type)
         ):
             raise ConfigError(
-                f"robot {spec.name!r}: got {spec.twist_type} for {spec.twist_topic}, "
+                f"robot {spec.name!r}: got {spec.twist_type} for {spec.twist.topic}, "
                 f"but robot {other.name!r} uses {other.twist_type} for this topic"
             )
 
@@ -197,7 +142,231 @@ def key_of(spec: RobotSpec) -> "Key":
     """
     from webmap.gate.events import Key  # the display checks specs without the events
 
-    if spec.twist_topic is not None:
-        return Key(spec.bridge_url, spec.twist_topic)
-    goal = spec.goal_topic or spec.action or f"robot {spec.id}"
-    return Key(spec.goal_url or spec.bridge_url, f"goal {goal}")
+    if spec.twist is not None:
+        return Key(spec.twist.bridge, spec.twist.topic)
+    goal = spec.navigation.topic or spec.navigation.action or f"robot {spec.id}"
+    return Key(spec.goal_url, f"goal {goal}")
+
+
+@dataclass(frozen=True, slots=True)
+class Axes:
+    """The limits of motion out of the plane, axis by axis.
+
+    An axis without a stated limit has 0: the machine does not move along it.
+    """
+
+    z: float = 0.0
+    """Metres per second upward and downward."""
+
+    rx: float = 0.0
+    """Radians per second about the forward axis."""
+
+    ry: float = 0.0
+    """Radians per second about the left axis."""
+
+    def refusal(self, twist: Twist) -> str | None:
+        """Return why ``twist`` cannot be sent to the machine, as text, or ``None``."""
+        for axis, wanted, unit, limit in (
+            ("z", twist.vz, "m/s", self.z),
+            ("rx", twist.wx, "rad/s", self.rx),
+            ("ry", twist.wy, "rad/s", self.ry),
+        ):
+            if wanted != 0 and limit == 0:
+                return (
+                    f"got {axis} = {wanted:g} {unit}, but no limit of the robot is "
+                    f"known for {axis}: state {axis}_max with its twist topic"
+                )
+        return None
+
+    def seen(self, measured: Twist | None) -> Twist | None:
+        """Return the measured velocity, reduced to the axes of the machine.
+
+        Args:
+            measured: The velocity in an odometry message, if it has one.
+
+        Returns:
+            ``None`` if the number of one of those axes is not finite.
+
+        """
+        if measured is None:
+            return None
+        seen = Twist(
+            measured.vx,
+            measured.vy,
+            measured.wz,
+            measured.vz if self.z else 0.0,
+            measured.wx if self.rx else 0.0,
+            measured.wy if self.ry else 0.0,
+        )
+        return seen if seen.is_finite else None
+
+
+PLANE = Axes()
+"""The axes of a machine that moves only in the plane."""
+
+
+def axes_of(bases: Iterable[TwistConfig]) -> Axes:
+    """Return the least limit of each axis; 0 if one robot states no limit for it.
+
+    Args:
+        bases: The bases of the robots that are declared for the machine.
+
+    """
+    limits = [(b.z_max or 0.0, b.rx_max or 0.0, b.ry_max or 0.0) for b in bases]
+    return Axes(*map(min, zip(*limits, strict=True)))
+
+
+@dataclass(frozen=True, slots=True)
+class Cap:
+    """One speed limit: metres and radians per second, and its reason as text."""
+
+    v: float
+    w: float
+    why: str
+
+
+@dataclass(frozen=True, slots=True)
+class Speed:
+    """The speed limits in force and their reasons."""
+
+    v: float
+    w: float
+    why: tuple[str, ...]
+
+
+def caps_of(base: TwistConfig, tested: "StopRecord | None" = None) -> list[Cap]:
+    """Return the caps of the robot itself.
+
+    Args:
+        base: The base of the robot.
+        tested: The result of its stop test; it overrides the stated ``stops_within``.
+
+    """
+    caps = []
+    seconds = base.stops_within if tested is None else tested.seconds
+    error = 0.0 if tested is None else min(tested.error, ERROR)
+    if seconds is None and tested is not None:
+        why = f"stop test failed on {tested.date}"
+        caps.append(Cap(SLOW_V, SLOW_W, why))
+    elif seconds is None:
+        caps.append(Cap(SLOW_V, SLOW_W, "stop not verified"))
+    elif seconds - error > STOPS_WITHIN:
+        why = f"command timeout of the base over {STOPS_WITHIN:g} s: {seconds:g} s"
+        caps.append(Cap(SLOW_V, SLOW_W, why))
+    v = math.inf if base.v_max is None else base.v_max
+    w = math.inf if base.w_max is None else base.w_max
+    caps.append(Cap(v, w, "limit of the robot"))
+    return caps
+
+
+def page_cap(v: float = math.inf, w: float = math.inf) -> Cap:
+    """Return the cap that a page asks for; a negative or NaN limit becomes 0."""
+    return Cap(v if v >= 0 else 0.0, w if w >= 0 else 0.0, "normal limit")
+
+
+def least(caps: Iterable[Cap]) -> Speed:
+    """Return the least of ``caps``; infinity if there is no limit."""
+    caps = list(caps)
+    v = min((cap.v for cap in caps), default=math.inf)
+    w = min((cap.w for cap in caps), default=math.inf)
+    why = dict.fromkeys(
+        cap.why
+        for cap in caps
+        if (cap.v == v and v < math.inf) or (cap.w == w and w < math.inf)
+    )
+    return Speed(v, w, tuple(why))
+
+
+def in_force(speed: Speed) -> Speed:
+    """Return ``speed``, or slow speeds if one of its limits is infinite."""
+    if math.inf not in (speed.v, speed.w):
+        return speed
+    v, w = min(speed.v, SLOW_V), min(speed.w, SLOW_W)
+    return Speed(v, w, (*speed.why, "no limit stated"))
+
+
+def speed_in_force(caps: Iterable[Cap]) -> Speed:
+    """Return the least of ``caps``; slow speeds if a limit is missing."""
+    return in_force(least(caps))
+
+
+def offered(own: Speed, page: Cap) -> Speed:
+    """Return the speeds that would be in force if a page took a free robot.
+
+    Args:
+        own: The limits of the robot itself, perhaps infinite.
+        page: The limits that the page asks for.
+
+    """
+    v, w = min(own.v, page.v), min(own.w, page.w)
+    binds = (own.v == v and v < math.inf) or (own.w == w and w < math.inf)
+    why = own.why if binds else ()
+    if page.v < own.v or page.w < own.w:
+        why = (*why, page.why)
+    return in_force(Speed(v, w, why))
+
+
+def fit(wanted: Twist, speed: Speed, *, holonomic: bool, axes: Axes = PLANE) -> Twist:
+    """Return ``wanted`` within ``speed`` and ``axes``, in the same direction.
+
+    Args:
+        wanted: A velocity of finite numbers.
+        speed: The speeds in force, whatever the direction.
+        holonomic: Whether the base can move sideways; if not, ``vy`` is exactly 0.
+        axes: The limits of the axes that lead out of the plane. A velocity along an
+            axis with the limit 0 becomes zero as a whole.
+
+    """
+    vx, vy = wanted.vx, wanted.vy if holonomic else 0.0
+    vx, vy, vz = _within((vx, vy, wanted.vz), speed.v, (math.inf, math.inf, axes.z))
+    wx, wy, wz = _within(
+        (wanted.wx, wanted.wy, wanted.wz), speed.w, (axes.rx, axes.ry, math.inf)
+    )
+    return Twist(vx, vy, wz, vz, wx, wy)
+
+
+def _within(parts: Vector, most: float, each: Vector) -> Vector:
+    """Return ``parts``, shortened until its length and each part are within limits.
+
+    A velocity along one axis is clamped exactly, without rounding. No quotient here is
+    larger than 1: infinity times zero would be NaN.
+    """
+    length = math.hypot(*parts)
+    found = list(parts)
+    if length > most:
+        found = [part / length * most for part in parts]
+    for axis, limit in enumerate(each):
+        if abs(found[axis]) > limit:
+            shorter = limit / abs(found[axis])
+            clamped = math.copysign(limit, found[axis])
+            found = [part * shorter for part in found]
+            found[axis] = clamped
+    x, y, z = (part + 0.0 for part in found)  # no negative zeros on the wire
+    return (x, y, z)
+
+
+def ramp(last: Twist, wanted: Twist, a_max: float, elapsed: float) -> Twist:
+    """Return ``wanted``, reduced if it accelerates too much.
+
+    Slowing down is never limited; reversing counts as speeding up from standstill. The
+    rates of turn are not ramped.
+
+    Args:
+        last: The velocity that was written last.
+        wanted: The velocity that is wanted now.
+        a_max: The greatest growth of the speed, in m/s², along each axis and in total.
+        elapsed: Seconds since ``last`` was written.
+
+    """
+    step = a_max * elapsed
+    vx, vy = _towards(last.vx, wanted.vx, step), _towards(last.vy, wanted.vy, step)
+    vz = _towards(last.vz, wanted.vz, step)
+    allowed, length = last.speed + step, math.hypot(vx, vy, vz)
+    if (vx, vy, vz).count(0.0) < 2 and length > allowed:  # diagonal, on several axes
+        vx, vy, vz = (part / length * allowed for part in (vx, vy, vz))
+    return Twist(vx, vy, wanted.wz, vz, wanted.wx, wanted.wy)
+
+
+def _towards(last: float, wanted: float, step: float) -> float:
+    base = abs(last) if last * wanted > 0 else 0.0
+    return math.copysign(min(abs(wanted), base + step), wanted)

@@ -9,11 +9,12 @@ import time
 import pytest
 from running_simulators import simulators
 
+from equipment.declarations import declared
 from equipment.waiting import until, wait_for
 from webmap.base.geometry import Twist
 from webmap.discovery import discover
 from webmap.gate.display.client import GateClient
-from webmap.gate.protocol import RobotReport, RobotSpec
+from webmap.gate.protocol import RobotReport
 from webmap.ros.rosbridge.server.dialect import REAL, dialect_of
 from webmap.ros.temporary_bridge import TemporaryBridge
 
@@ -47,7 +48,7 @@ class Site:
         action, type = ACTIONS[dialect_of(version)]
         for id, frame in (("bob", "map"), ("lost", "moon")):
             self.client.declare(
-                RobotSpec(
+                declared(
                     id=id,
                     name=id,
                     bridge_url=simulator.url,

@@ -7,9 +7,10 @@ import signal
 import pytest
 from running_simulators import simulators
 
+from equipment.declarations import declared
 from equipment.waiting import wait_for
 from webmap.gate.display.client import GateClient
-from webmap.gate.protocol import RobotReport, RobotSpec
+from webmap.gate.protocol import RobotReport
 
 pytestmark = pytest.mark.slow
 
@@ -58,7 +59,7 @@ def test_a_goal_after_a_restart_of_the_gate_is_not_taken_for_the_earlier_one(
         robot = simulator.world.robots[1]
         action, type = ACTIONS[dialect]
         client.declare(
-            RobotSpec(
+            declared(
                 id="r1",
                 name="Bob",
                 bridge_url=simulator.url,

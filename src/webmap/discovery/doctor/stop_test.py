@@ -18,6 +18,7 @@ import click
 from webmap.base.echo import echo
 from webmap.base.errors import BridgeError, ConfigError
 from webmap.base.text import escaped
+from webmap.config.motion import TwistConfig
 from webmap.discovery import FoundRobot, discover
 from webmap.discovery.robots import host_name
 from webmap.gate.display.client import GateClient
@@ -224,9 +225,7 @@ def _spec(url: str, name: str, robots: tuple[FoundRobot, ...]) -> RobotSpec:
     return RobotSpec(
         id=ROBOT,
         name=name,
-        bridge_url=url,
-        twist_topic=velocity.topic,
-        twist_type=velocity.type,
+        twist=TwistConfig(topic=velocity.topic, type=velocity.type, bridge=url),
         odometry_topic=odometry.topic,
         odometry_type=odometry.type,
     )
@@ -256,7 +255,7 @@ def _run(client: GateClient, spec: RobotSpec, yes: bool) -> int:
 
 def _agrees(spec: RobotSpec) -> bool:
     return click.confirm(
-        f"{escaped(spec.name)} ({escaped(spec.twist_topic or '')}) will creep forward "
+        f"{escaped(spec.name)} ({escaped(spec.base.topic)}) will creep forward "
         "at 0.1 m/s for up to 5 s. Is half a metre free in front of it?",
         default=False,
     )

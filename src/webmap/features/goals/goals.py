@@ -194,10 +194,10 @@ class InitialPoseTool:
     def _send_covariance(self, id: Any) -> None:
         robot = self.map.find_robot(id)
         spec = robot.motion.spec() if robot is not None else None
-        if robot is None or spec is None or spec.pose_topic is None:
+        if robot is None or spec is None or spec.initial_pose is None:
             self.browser_part.send({"covariance": None})
             return
-        x, y, yaw = spec.pose_covariance
+        x, y, yaw = spec.initial_pose.covariance
         covariance = {
             "robot": robot.id,
             "x": x,

@@ -168,8 +168,8 @@ class GateClient:
             ConfigError: If ``spec`` has an invalid value.
 
         """
-        spec = checked(spec)
         try:
+            spec = checked(spec)
             pipe.pack(spec)
         except TypeError as error:  # otherwise no new gate could receive it
             raise ConfigError(f"robot {spec.name!r}: {error}") from error

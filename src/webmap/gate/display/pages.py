@@ -108,8 +108,8 @@ from webmap.base.roles import NOT_YOURS, Role
 from webmap.base.text import isolated
 from webmap.gate import protocol
 from webmap.gate.commands import MoveFor, Refusal, Release, Stop, op_of, parse
-from webmap.gate.limits import Cap, Speed, offered, page_cap
 from webmap.gate.protocol import Hello, Identity, Refused, RobotGone, RobotReport
+from webmap.gate.specs import Cap, Speed, offered, page_cap
 
 
 def hello_text(hello: Hello, ticks: int) -> str:

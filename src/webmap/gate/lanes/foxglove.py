@@ -179,7 +179,7 @@ class FoxgloveWire:
 
         The services are hidden, too.
         """
-        action = spec.action or ""  # never empty: the rules checked it
+        action = spec.navigation.action or ""  # never empty: the rules checked it
         numbers = {part: n for n, (of, part) in self._services.items() if of == action}
         if not _ACTION.keys() <= numbers.keys():
             return None

@@ -74,11 +74,11 @@ class Links:
                 return self._send_goal(action)
             case actions.SendPose(key, robot, x, y, yaw, by):
                 spec = self._robots[key][robot]
-                done = self._tasks[_goal_url(spec)].send_pose(spec, action)
+                done = self._tasks[spec.goal_url].send_pose(spec, action)
                 return PoseWritten(robot, x, y, yaw, by, done)
             case actions.CancelGoals(key, robot):
                 spec = self._robots[key][robot]
-                self._tasks[_goal_url(spec)].cancel(spec)
+                self._tasks[spec.goal_url].cancel(spec)
             case actions.RunHook():
                 self._run_hook(action)
             case actions.Watch(key, on):
@@ -96,7 +96,7 @@ class Links:
                 watched = key in self._watched
                 self._unwatch(key)
                 spec = self._robots[key].pop(robot)
-                self._tasks[_goal_url(spec)].forget(robot)
+                self._tasks[spec.goal_url].forget(robot)
                 self._detach(key, spec)
                 if watched and self._robots[key]:
                     self._watch(key)
@@ -126,7 +126,7 @@ class Links:
 
     def _send_goal(self, goal: actions.SendGoal) -> GoalWritten:
         spec = self._robots[goal.key][goal.robot]
-        done = self._tasks[_goal_url(spec)].send(spec, goal)
+        done = self._tasks[spec.goal_url].send(spec, goal)
         return GoalWritten(goal.robot, goal.id, goal.x, goal.y, goal.yaw, goal.by, done)
 
     def _run_hook(self, run: actions.RunHook) -> None:
@@ -149,12 +149,12 @@ class Links:
         watched = key in self._watched
         self._unwatch(key)
         robots[spec.id] = spec
-        if spec.twist_topic is not None:
-            control = self._control.get(spec.bridge_url)
+        if spec.twist is not None:
+            url, topic = spec.twist.bridge, spec.twist.topic
+            control = self._control.get(url)
             if control is None:
-                control = ControlLane(spec.bridge_url, self._emit)
-                self._control[spec.bridge_url] = control
-            control.attach(spec.twist_topic, spec.twist_type, spec.twist_type_assumed)
+                control = self._control[url] = ControlLane(url, self._emit)
+            control.attach(topic, spec.twist_type, spec.twist_type_assumed)
         for url in _odometry_urls_of(spec):
             self._odometry_at(url).lane.hold("robots")
         for url, topics in _tasks_of(spec).items():
@@ -165,8 +165,8 @@ class Links:
             tasks.lane.hold("robots")
             tasks.attach(topics)
         if earlier is not None:
-            if (_goal_url(earlier), earlier.action) != (_goal_url(spec), spec.action):
-                self._tasks[_goal_url(earlier)].forget(spec.id)
+            if _action_of(earlier) != _action_of(spec):
+                self._tasks[earlier.goal_url].forget(spec.id)
             # Only now: what both declarations need stays announced.
             self._detach(key, earlier)
         if watched:
@@ -174,9 +174,9 @@ class Links:
         self._close_unwanted()
 
     def _detach(self, key: Key, spec: RobotSpec) -> None:
-        if spec.twist_topic is not None:
-            self._control[spec.bridge_url].detach(
-                spec.twist_topic, spec.twist_type, spec.twist_type_assumed
+        if spec.twist is not None:
+            self._control[spec.twist.bridge].detach(
+                spec.twist.topic, spec.twist_type, spec.twist_type_assumed
             )
         for url in _odometry_urls_of(spec):
             self._odometry_at(url).lane.release_hold("robots")
@@ -187,30 +187,32 @@ class Links:
     def _watch(self, key: Key) -> None:
         specs = list(self._robots[key].values())
         self._watched[key] = specs
-        if any(spec.twist_topic is not None for spec in specs):
+        if any(spec.twist is not None for spec in specs):
             self._control[key.url].listen(key.topic)
         for spec in specs:
             if spec.odometry_topic is not None:
                 self._odometry_at(_odometry_url(spec)).watch(
                     spec.odometry_topic, spec.odometry_type, key
                 )
-            if spec.assist is not None:
-                self._odometry_at(spec.bridge_url).watch_scan(spec.assist.topic, key)
+            if spec.scan_assist is not None:
+                scans = self._odometry_at(spec.bridge_url)
+                scans.watch_scan(spec.scan_assist.topic, key)
 
     def _unwatch(self, key: Key) -> None:
         specs = self._watched.pop(key, [])
-        if any(spec.twist_topic is not None for spec in specs):
+        if any(spec.twist is not None for spec in specs):
             self._control[key.url].ignore(key.topic)
         for spec in specs:
             if spec.odometry_topic is not None:
                 odometry = self._odometry_at(_odometry_url(spec))
                 odometry.unwatch(spec.odometry_topic, key)
-            if spec.assist is not None:
-                self._odometry_at(spec.bridge_url).unwatch_scan(spec.assist.topic, key)
+            if spec.scan_assist is not None:
+                scans = self._odometry_at(spec.bridge_url)
+                scans.unwatch_scan(spec.scan_assist.topic, key)
 
     def _ping_often(self, key: Key, on: bool) -> None:
         specs = self._watched.get(key, [])
-        if any(spec.twist_topic is not None for spec in specs):
+        if any(spec.twist is not None for spec in specs):
             control = self._control[key.url]
             (control.listen if on else control.ignore)(key.topic)
         for url in {url for spec in specs for url in _odometry_urls_of(spec)}:
@@ -243,16 +245,16 @@ def _odometry_url(spec: RobotSpec) -> str:
 def _odometry_urls_of(spec: RobotSpec) -> list[str]:
     """Return the bridges that a robot's odometry and scans come from."""
     urls = [] if spec.odometry_topic is None else [_odometry_url(spec)]
-    return urls if spec.assist is None else [*urls, spec.bridge_url]
+    return urls if spec.scan_assist is None else [*urls, spec.bridge_url]
 
 
-def _goal_url(spec: RobotSpec) -> str:
-    return spec.goal_url or spec.bridge_url
+def _action_of(spec: RobotSpec) -> tuple[str, str | None]:
+    return spec.goal_url, spec.navigation.action
 
 
 def _tasks_of(spec: RobotSpec) -> dict[str, list[Topic]]:
     """Return, by bridge, the topics of the tasks lanes that a robot needs."""
-    needed = {_goal_url(spec): goal_topics(spec)}
-    if spec.stop_hooks:
+    needed = {spec.goal_url: goal_topics(spec)}
+    if spec.base.stop_hooks:
         needed.setdefault(spec.bridge_url, []).extend(hook_topics(spec))
     return needed

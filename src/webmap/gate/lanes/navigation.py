@@ -170,7 +170,7 @@ def of_message(
     topic: str, fields: Any, spec: RobotSpec, goal: SendGoal
 ) -> GoalNews | None:
     """Return the news of a goal in a message from one of move_base's topics."""
-    part = topic.removeprefix(f"{spec.action}/")
+    part = topic.removeprefix(f"{spec.navigation.action}/")
     message = _as(fields, _ActionlibMessage)
     if message is None or part not in ("status", "feedback", "result"):
         return None

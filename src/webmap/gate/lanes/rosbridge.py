@@ -104,15 +104,15 @@ MOVE_BASE_GOAL = "move_base_msgs/MoveBaseActionGoal"
 def goal_message(spec: RobotSpec, goal: SendGoal) -> Message:
     """Return the message that sends the robot to a goal, unless it is an action."""
     if goal.method == "topic":
-        topic = spec.goal_topic or ""  # never empty: the rules checked it
-        return topic, spec.goal_type, _stamped(spec.goal_type, spec, _pose(goal))
+        type = spec.goal_type("PoseStamped")
+        return spec.navigation.topic, type, _stamped(type, spec, _pose(goal))
     target = _stamped("geometry_msgs/PoseStamped", spec, _pose(goal))
     message = {
         "header": _header("", ""),
         "goal_id": {"stamp": {"secs": 0, "nsecs": 0}, "id": goal.id},
         "goal": {"target_pose": target},
     }
-    return f"{spec.action}/goal", MOVE_BASE_GOAL, message
+    return f"{spec.navigation.action}/goal", MOVE_BASE_GOAL, message
 
 
 def action_fields(spec: RobotSpec, goal: SendGoal) -> dict[str, Any]:
@@ -127,8 +127,8 @@ def action_goal(spec: RobotSpec, goal: SendGoal) -> bytes:
         {
             "op": "send_action_goal",
             "id": goal.id,
-            "action": spec.action,
-            "action_type": spec.action_type,
+            "action": spec.navigation.action,
+            "action_type": spec.navigation.action_type,
             "args": action_fields(spec, goal),
             "feedback": True,
         },
@@ -163,11 +163,12 @@ def trigger(service: str, type: str, id: str) -> bytes:
 
 def pose_estimate(spec: RobotSpec, at: SendPose) -> Message:
     """Return the message that sends the robot its pose."""
+    assert spec.initial_pose is not None  # the rules checked it
     covariance = [0.0] * 36
-    covariance[0], covariance[7], covariance[35] = spec.pose_covariance
+    covariance[0], covariance[7], covariance[35] = spec.initial_pose.covariance
     pose = {"pose": _pose(at), "covariance": covariance}
-    topic = spec.pose_topic or ""  # never empty: the rules checked it
-    return topic, spec.pose_type, _stamped(spec.pose_type, spec, pose)
+    type = spec.goal_type("PoseWithCovarianceStamped")
+    return spec.initial_pose.topic, type, _stamped(type, spec, pose)
 
 
 def _pose(at: SendGoal | SendPose) -> dict[str, Any]:

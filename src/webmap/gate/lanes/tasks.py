@@ -17,6 +17,7 @@ from dataclasses import replace
 from typing import TypeVar
 
 from webmap.base.geometry import Pose
+from webmap.config.motion import StopHook
 from webmap.gate.actions import SendGoal, SendPose
 from webmap.gate.events import (
     ActionsOffered,
@@ -32,7 +33,7 @@ from webmap.gate.lanes.calls import Ended, ServiceCalls
 from webmap.gate.lanes.navigation import GoalNews
 from webmap.gate.lanes.sockets import Socket, SocketHandlers
 from webmap.gate.lanes.wires import ActionGoal, wire_to
-from webmap.gate.protocol import RobotSpec, StopHook
+from webmap.gate.protocol import RobotSpec
 from webmap.gate.rules.goals import is_move_base
 
 Place = TypeVar("Place", SendGoal, SendPose)
@@ -134,15 +135,16 @@ class TasksLane:
 
     def cancel(self, spec: RobotSpec) -> None:
         """Cancel every goal of the robot, by every method that it has."""
-        if spec.cancel_topic is not None:
-            self._publish(rosbridge.cancel_message(spec.cancel_topic))
-        if spec.action is not None and is_move_base(spec):
-            topic = f"{spec.action}/cancel"
-            if topic != spec.cancel_topic:
+        move = spec.navigation
+        if move.cancel_topic is not None:
+            self._publish(rosbridge.cancel_message(move.cancel_topic))
+        if move.action is not None and is_move_base(spec):
+            topic = f"{move.action}/cancel"
+            if topic != move.cancel_topic:
                 self._publish(rosbridge.cancel_message(topic))
-        elif spec.action is not None:
-            what = f"cancelling the goals of {spec.action}"
-            self._calls.call(self._wire.cancel_call(spec.action), what)
+        elif move.action is not None:
+            what = f"cancelling the goals of {move.action}"
+            self._calls.call(self._wire.cancel_call(move.action), what)
 
     def run_hook(self, hook: StopHook, stopped: bool, ended: Ended) -> None:
         """Publish the Bool of a stop hook, or call its service.
@@ -233,7 +235,7 @@ class TasksLane:
         self.forget(goal.robot)
         self._followed[goal.robot] = (spec, goal)
         for part, (type, throttle) in _ACTIONLIB.items():
-            topic = f"{spec.action}/{part}"
+            topic = f"{spec.navigation.action}/{part}"
             id = f"webmap-gate follow {topic} {goal.robot}"
             self._wire.subscribe(id, topic, type, throttle)
 
@@ -242,7 +244,7 @@ class TasksLane:
         found = self._followed.pop(robot, None)
         if found is not None:
             for part in _ACTIONLIB:
-                topic = f"{found[0].action}/{part}"
+                topic = f"{found[0].navigation.action}/{part}"
                 self._wire.release(f"webmap-gate follow {topic} {robot}")
 
     def _on_message(self, data: bytes) -> None:
@@ -281,22 +283,23 @@ class FeedbackThrottle:
 
 def hook_topics(spec: RobotSpec) -> list[Topic]:
     """Return the topics of a robot's stop hooks."""
-    return [(hook.topic, hook.type) for hook in spec.stop_hooks if hook.topic]
+    return [(hook.topic, hook.type) for hook in spec.base.stop_hooks if hook.topic]
 
 
 def goal_topics(spec: RobotSpec) -> list[Topic]:
     """Return the topics of a robot's goals, cancels and poses, with their types."""
-    topics = []
-    if spec.goal_topic is not None:
-        topics.append((spec.goal_topic, spec.goal_type))
-    if spec.cancel_topic is not None:
-        topics.append((spec.cancel_topic, rosbridge.GOAL_ID))
-    if spec.action is not None and is_move_base(spec):
-        topics.append((f"{spec.action}/goal", rosbridge.MOVE_BASE_GOAL))
-        if spec.cancel_topic != f"{spec.action}/cancel":
-            topics.append((f"{spec.action}/cancel", rosbridge.GOAL_ID))
-    if spec.pose_topic is not None:
-        topics.append((spec.pose_topic, spec.pose_type))
+    topics, move = [], spec.navigation
+    if move.topic:
+        topics.append((move.topic, spec.goal_type("PoseStamped")))
+    if move.cancel_topic is not None:
+        topics.append((move.cancel_topic, rosbridge.GOAL_ID))
+    if move.action is not None and is_move_base(spec):
+        topics.append((f"{move.action}/goal", rosbridge.MOVE_BASE_GOAL))
+        if move.cancel_topic != f"{move.action}/cancel":
+            topics.append((f"{move.action}/cancel", rosbridge.GOAL_ID))
+    if spec.initial_pose is not None:
+        type = spec.goal_type("PoseWithCovarianceStamped")
+        topics.append((spec.initial_pose.topic, type))
     return topics
 
 

@@ -2,12 +2,13 @@
 
 from operator import attrgetter
 
+from webmap.config.motion import StopHook, TwistConfig
 from webmap.gate.actions import Detach, Emit, RunHook, SendToDisplay
 from webmap.gate.events import HookEnded, Key
-from webmap.gate.limits import Axes, axes_of
-from webmap.gate.protocol import Refused, RobotSpec, StopHook
+from webmap.gate.protocol import Refused, RobotSpec
 from webmap.gate.rules.goals import Goals
 from webmap.gate.rules.health import LinkHealth
+from webmap.gate.specs import Axes, axes_of
 
 NO_LINK = "not sent yet: no connection"
 
@@ -56,7 +57,7 @@ class StopHooks:
         self._stopped, self._number = stopped, self._number + 1
         self._owes_reset = not stopped and not self.link.up
         self._unanswered.clear()
-        for hook in self.spec.stop_hooks:
+        for hook in self.spec.base.stop_hooks:
             # A service of type Trigger cannot be undone: an emergency stop of the
             # robot itself is reset at the robot.
             if not stopped and hook.service:
@@ -91,23 +92,7 @@ class StopHooks:
         self._failed.clear()
 
 
-_terms = attrgetter(
-    "twist_type",
-    "holonomic",
-    "stops_within",
-    "v_max",
-    "w_max",
-    "z_max",
-    "rx_max",
-    "ry_max",
-    "a_max",
-    "check_every",
-    "odometry_url",
-    "odometry_topic",
-    "assist",
-    "stop_hooks",
-    "drive_without_proof",
-)
+_terms = attrgetter("twist", "scan_assist", "odometry_url", "odometry_topic")
 """The part of a robot's declaration that applies to the whole machine."""
 
 
@@ -136,9 +121,14 @@ class Aliases:
         return next(reversed(self.specs.values()))
 
     @property
+    def bases(self) -> list[TwistConfig]:
+        """The base of each robot: its velocity topic, limits and stop hooks."""
+        return [spec.base for spec in self.specs.values()]
+
+    @property
     def drivable(self) -> bool:
         """Whether the machine has a velocity topic, and not only goals."""
-        return self.newest.twist_topic is not None
+        return self.newest.twist is not None
 
     @property
     def has_odometry(self) -> bool:
@@ -148,23 +138,22 @@ class Aliases:
     @property
     def holonomic(self) -> bool:
         """Whether every robot is declared to move sideways."""
-        return all(spec.holonomic for spec in self.specs.values())
+        return all(base.holonomic for base in self.bases)
 
     @property
     def axes(self) -> Axes:
         """The axes out of the plane along which it moves, and their speed limits."""
-        return axes_of(self.specs.values())
+        return axes_of(self.bases)
 
     @property
     def a_max(self) -> float | None:
         """The greatest acceleration in m/s², if one is declared."""
-        return min((s.a_max for s in self.specs.values() if s.a_max), default=None)
+        return min((b.a_max for b in self.bases if b.a_max), default=None)
 
     @property
     def check_every(self) -> float | None:
         """Seconds after a check until the next one is due, if a robot demands it."""
-        every = [s.check_every for s in self.specs.values() if s.check_every]
-        return min(every, default=None)
+        return min((b.check_every for b in self.bases if b.check_every), default=None)
 
     @property
     def stops_within(self) -> float | None:
@@ -172,14 +161,14 @@ class Aliases:
 
         If they differ, the largest counts.
         """
-        stated = [spec.stops_within for spec in self.specs.values()]
+        stated = [base.stops_within for base in self.bases]
         known = [seconds for seconds in stated if seconds is not None]
         return max(known) if len(known) == len(stated) else None
 
     @property
     def drive_without_proof(self) -> bool:
         """Whether every robot accepts that nothing but echoes shows what arrived."""
-        return all(spec.drive_without_proof for spec in self.specs.values())
+        return all(base.drive_without_proof for base in self.bases)
 
     @property
     def follow_goals(self) -> bool:
@@ -230,7 +219,7 @@ class Aliases:
             goals.cancel_unless_reachable(spec, now)
             goals.spec, goals.link = spec, tasks
         earlier = self.hooks.get(spec.id)
-        if earlier is None or earlier.spec.stop_hooks != spec.stop_hooks:
+        if earlier is None or earlier.spec.base.stop_hooks != spec.base.stop_hooks:
             self.hooks[spec.id] = StopHooks(self._key, spec, hooks, self._emit)
         else:  # keep an owed reset and an expected answer
             earlier.spec, earlier.link = spec, hooks

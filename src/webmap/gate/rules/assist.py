@@ -20,8 +20,8 @@ import msgspec
 
 from webmap.base.geometry import Twist
 from webmap.base.outline import Point
+from webmap.config.motion import ScanAssistConfig
 from webmap.gate.events import Scan
-from webmap.gate.protocol import AssistSpec
 from webmap.gate.rules import scan_geometry
 from webmap.gate.rules.aliases import Aliases
 from webmap.gate.rules.scan_geometry import (
@@ -59,7 +59,7 @@ FREE = AllowedShare(1.0, None)
 
 
 def assist(
-    spec: AssistSpec, sweep: Scan | None, wanted: Twist, now: float
+    spec: ScanAssistConfig, sweep: Scan | None, wanted: Twist, now: float
 ) -> AllowedShare:
     """Return the share of a velocity that the scan allows.
 
@@ -79,7 +79,7 @@ def assist(
         return _blind(spec, speed, reason)
     assert sweep is not None
     points = points_of(spec, sweep, _horizon(spec, speed))
-    gap = free_way(spec.footprint, points, wanted) * speed
+    gap = free_way(spec.corners, points, wanted) * speed
     room = gap - spec.stop_distance - REACTION * speed
     allowed = math.sqrt(2 * spec.brake * room) if room > 0 else 0.0
     if allowed >= speed:
@@ -87,7 +87,9 @@ def assist(
     return AllowedShare(allowed / speed, f"scan assist: obstacle {gap:.1f} m away")
 
 
-def points_of(spec: AssistSpec, sweep: Scan, within: float = math.inf) -> list[Point]:
+def points_of(
+    spec: ScanAssistConfig, sweep: Scan, within: float = math.inf
+) -> list[Point]:
     """Return the hits of a scan in the robot's frame, without hits of its own body.
 
     Args:
@@ -96,32 +98,40 @@ def points_of(spec: AssistSpec, sweep: Scan, within: float = math.inf) -> list[P
         within: The greatest distance of a point from the robot's origin, in metres.
 
     """
-    far = within + math.hypot(spec.sensor[0], spec.sensor[1])
+    place, corners = spec.sensor, spec.corners
+    far = within + math.hypot(place[0], place[1])
     points = []
     for ray, reach in enumerate(sweep.ranges):
         if reach > far:
             continue
-        point = _point(spec, sweep, ray, reach)
+        point = _point(place, corners, sweep, ray, reach)
         if point is None and sweep.fold is not None:
             # The nearest hit may be the robot's own body: look behind it.
-            behind = (_point(spec, sweep, ray, r) for r in sweep.fold.behind[ray])
+            ranges = sweep.fold.behind[ray]
+            behind = (_point(place, corners, sweep, ray, each) for each in ranges)
             point = next((there for there in behind if there is not None), None)
         if point is not None and math.hypot(*point) <= within:
             points.append(point)
     return points
 
 
-def _point(spec: AssistSpec, sweep: Scan, ray: int, reach: float) -> Point | None:
+def _point(
+    place: tuple[float, float, float],
+    corners: Sequence[Point],
+    sweep: Scan,
+    ray: int,
+    reach: float,
+) -> Point | None:
     """Return the hit of a ray; ``None`` for no hit, or one of the robot's own body."""
     if reach == -math.inf:
         reach = max(sweep.range_min, 0.0)
     elif not (sweep.range_min <= reach < math.inf):
         # A hit beyond range_max counts: range_max may be wrong or missing.
         return None
-    x0, y0, yaw0 = spec.sensor
+    x0, y0, yaw0 = place
     bearing = yaw0 + sweep.angle_min + ray * sweep.angle_increment
     point = (x0 + reach * math.cos(bearing), y0 + reach * math.sin(bearing))
-    return None if inside(spec.footprint, point) else point
+    return None if inside(corners, point) else point
 
 
 def free_way(
@@ -172,12 +182,12 @@ def _turned_over(sweep: Scan) -> Scan:
     )
 
 
-def _reach_speed(spec: AssistSpec, twist: Twist) -> float:
+def _reach_speed(spec: ScanAssistConfig, twist: Twist) -> float:
     """Return an upper bound of the speed of every corner, in metres per second."""
     return math.hypot(twist.vx, twist.vy) + abs(twist.wz) * _outer(spec)
 
 
-def _horizon(spec: AssistSpec, speed: float) -> float:
+def _horizon(spec: ScanAssistConfig, speed: float) -> float:
     """Return the greatest distance from the origin at which a point matters.
 
     No part of the robot moves faster than ``speed``, so it stops before a point that is
@@ -187,12 +197,12 @@ def _horizon(spec: AssistSpec, speed: float) -> float:
     return (_outer(spec) + length) * (1 + _ROUNDING) + _ROUNDING
 
 
-def _outer(spec: AssistSpec) -> float:
-    return max(math.hypot(x, y) for x, y in spec.footprint)
+def _outer(spec: ScanAssistConfig) -> float:
+    return max(math.hypot(x, y) for x, y in spec.corners)
 
 
 def _blindness(
-    spec: AssistSpec, sweep: Scan | None, wanted: Twist, now: float
+    spec: ScanAssistConfig, sweep: Scan | None, wanted: Twist, now: float
 ) -> str | None:
     if sweep is None:
         return "no scan yet"
@@ -218,7 +228,7 @@ def _blindness(
     return None
 
 
-def _covers_path(spec: AssistSpec, sweep: Scan, wanted: Twist) -> bool:
+def _covers_path(spec: ScanAssistConfig, sweep: Scan, wanted: Twist) -> bool:
     """Return whether the scan covers the robot's path until it could stop."""
     fan = _fan(sweep)
     speed = math.hypot(wanted.vx, wanted.vy)
@@ -226,7 +236,7 @@ def _covers_path(spec: AssistSpec, sweep: Scan, wanted: Twist) -> bool:
         return fan.share >= KNOWN
     length = REACTION * speed + speed * speed / (2 * spec.brake) + spec.stop_distance
     return looks_ahead(
-        fan, spec.footprint, spec.sensor, wanted, length / speed, spec.stop_distance
+        fan, spec.corners, spec.sensor, wanted, length / speed, spec.stop_distance
     )
 
 
@@ -239,7 +249,7 @@ def _fan(sweep: Scan) -> ScanDirections:
     return ScanDirections(sweep.angle_min, sweep.angle_increment, len(sweep.ranges))
 
 
-def _rays_towards(spec: AssistSpec, sweep: Scan, wanted: Twist) -> Sequence[int]:
+def _rays_towards(spec: ScanAssistConfig, sweep: Scan, wanted: Twist) -> Sequence[int]:
     """Return the rays towards the motion; all rays if it turns on the spot."""
     rays = range(len(sweep.ranges))
     if math.hypot(wanted.vx, wanted.vy) < _ON_THE_SPOT:
@@ -253,7 +263,7 @@ def _rays_towards(spec: AssistSpec, sweep: Scan, wanted: Twist) -> Sequence[int]
     ]
 
 
-def _blind(spec: AssistSpec, speed: float, reason: str) -> AllowedShare:
+def _blind(spec: ScanAssistConfig, speed: float, reason: str) -> AllowedShare:
     why = f"scan assist: {reason}"
     if spec.blind == "stop":
         return AllowedShare(0.0, why)
@@ -306,9 +316,9 @@ class ScanAssist:
         """Return the velocity that the scans of all robots allow."""
         verdict = min(
             (
-                assist(spec.assist, self._sweeps.get(spec.assist.topic), wanted, now)
+                assist(about, self._sweeps.get(about.topic), wanted, now)
                 for spec in self._robots.specs.values()
-                if spec.assist is not None
+                if (about := spec.scan_assist) is not None
             ),
             key=_scale,
             default=FREE,

@@ -15,7 +15,6 @@ from dataclasses import replace
 from webmap.base.geometry import Twist
 from webmap.gate.commands import Refusal
 from webmap.gate.events import Key, LockState
-from webmap.gate.limits import Cap, page_cap
 from webmap.gate.rules.aliases import Aliases
 from webmap.gate.rules.connections import Connection, Epochs, Lease
 from webmap.gate.rules.delivery import Delivery, without_proof
@@ -28,6 +27,7 @@ from webmap.gate.rules.health import (
 from webmap.gate.rules.motion import DeadMan, Motion
 from webmap.gate.rules.speeds import MachineSpeeds
 from webmap.gate.rules.stop import StopLatch
+from webmap.gate.specs import Cap, page_cap
 from webmap.ros.names import is_foxglove_url
 
 NO_TIMEOUT = (
@@ -92,7 +92,7 @@ class MotionConditions:
                 return without_proof(self._url)
             return None
         goals = self._robots.goals[self._robots.newest.id]
-        if goals.spec.goal_topic is None and goals.spec.action is None:
+        if goals.spec.move is None:
             return "the robot has no velocity topic and no goal topic"
         return goals.why_not
 

@@ -13,9 +13,9 @@ import math
 from webmap.gate.actions import Emit, SaveCheck
 from webmap.gate.commands import Refusal
 from webmap.gate.events import CheckRecord, Key
-from webmap.gate.limits import SLOW_V, SLOW_W, Cap
 from webmap.gate.protocol import CheckReport
 from webmap.gate.rules.aliases import Aliases
+from webmap.gate.specs import SLOW_V, SLOW_W, Cap
 
 PROVED_FOR = 120.0
 """Seconds after the reset of a proved STOP within which a check counts."""

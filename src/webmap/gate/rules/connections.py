@@ -11,7 +11,6 @@ from webmap.base.roles import Role
 from webmap.base.text import isolated
 from webmap.gate.actions import Emit, SendToDisplay
 from webmap.gate.commands import Refusal
-from webmap.gate.limits import page_cap
 from webmap.gate.protocol import (
     PROGRAM,
     CloseConnection,
@@ -21,6 +20,7 @@ from webmap.gate.protocol import (
     Refused,
     RefusedCount,
 )
+from webmap.gate.specs import page_cap
 
 PERIOD = 0.05
 """Seconds between two ticks."""

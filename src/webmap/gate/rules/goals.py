@@ -3,6 +3,7 @@
 import msgspec
 
 from webmap.base.identifiers import generate_id
+from webmap.config.motion import MOVE_BASE
 from webmap.gate.actions import CancelGoals, Emit, SendGoal, SendPose
 from webmap.gate.commands import Refusal
 from webmap.gate.events import GoalEnded, GoalLost, GoalProgress, GoalWritten, Key
@@ -11,9 +12,6 @@ from webmap.gate.rules.delivery import without_proof
 from webmap.gate.rules.health import LinkHealth
 from webmap.gate.rules.motion import WAIT_LIMIT
 from webmap.ros.names import is_foxglove_url, is_type
-
-MOVE_BASE = "move_base_msgs/MoveBaseAction"
-"""The action type of ROS 1."""
 
 LATELY = 2.0
 """Seconds after a cancel for driving in which driving causes no further cancel."""
@@ -79,46 +77,46 @@ class Goals:
     @property
     def method(self) -> GoalMethod | None:
         """The method for goals of this robot; ``None`` if goals cannot be sent."""
-        spec = self.spec
-        if spec.action is not None and is_move_base(spec):
+        move = self.spec.navigation
+        if move.action is not None and is_move_base(self.spec):
             return "move_base"
-        if spec.action is None or self._sends_no_actions:
-            return None if spec.goal_topic is None else "topic"
+        if move.action is None or self._sends_no_actions:
+            return "topic" if move.topic else None
         return "navigate_to_pose"
 
     @property
     def _sends_no_actions(self) -> bool:
         """Whether goals are not sent to the action of ROS 2 but to a topic, if any."""
-        spec = self.spec
-        if is_foxglove_url(spec.goal_url or spec.bridge_url):
-            return spec.action not in self.link.actions
-        return self._no_actions and spec.goal_topic is not None
+        if is_foxglove_url(self.spec.goal_url):
+            return self.spec.navigation.action not in self.link.actions
+        return self._no_actions and self.spec.navigation.topic != ""
 
     @property
     def why_not(self) -> str | None:
         """Why goals cannot be sent to the robot, as text, or ``None``."""
-        action = self.spec.action
-        if action is None and self.spec.goal_topic is None:
+        if self.spec.move is None:
             return "no goal topic and no action is set"
         if not self.link.up:
             return "no connection to the bridge that takes goals"
         if self.method is None:
             return (
-                f"the Foxglove bridge does not offer {action} as an action of type "
-                "NavigateToPose: start it with include_hidden:=true, or set a goal "
-                "topic"
+                f"the Foxglove bridge does not offer {self.spec.move.action} as an "
+                "action of type NavigateToPose: start it with include_hidden:=true, or "
+                "set a goal topic"
             )
         return None
 
     @property
     def can_cancel(self) -> bool:
         """Whether the robot has an action, or a topic to cancel goals."""
-        return self.spec.cancel_topic is not None or self.spec.action is not None
+        move = self.spec.navigation
+        return move.cancel_topic is not None or move.action is not None
 
     @property
     def _cancels_by_service(self) -> bool:
         """Whether a cancel is a service call, on a socket of its own."""
-        return self.spec.action is not None and not is_move_base(self.spec)
+        has_action = self.spec.navigation.action is not None
+        return has_action and not is_move_base(self.spec)
 
     @property
     def following(self) -> bool:
@@ -164,8 +162,8 @@ class Goals:
             raise Refusal(self.why_not)
         method = self.method
         assert method is not None  # without one there is a reason
-        if self.link.only_echoes and not self.spec.drive_without_proof:
-            raise Refusal(without_proof(self.spec.goal_url or self.spec.bridge_url))
+        if self.link.only_echoes and not self.spec.base.drive_without_proof:
+            raise Refusal(without_proof(self.spec.goal_url))
         id, until = generate_id(), now + WAIT_LIMIT
         self._emit(SendGoal(self._key, self.spec.id, id, x, y, yaw, by, method, until))
 
@@ -177,7 +175,7 @@ class Goals:
                 follows a goal, which it would then follow from a wrong pose.
 
         """
-        if self.spec.pose_topic is None:
+        if self.spec.initial_pose is None:
             raise Refusal("no topic for the initial pose is set")
         # A goal without feedback and without a cancel would block this for ever, and so
         # would one whose cancel was not answered.
@@ -246,8 +244,9 @@ class Goals:
         if report is not None and report.state not in OVER:
             self._cancelled_at = float("-inf")  # a cancel is answered by this
             outcome, why = end.outcome, end.why
-            if end.no_actions and self.spec.goal_topic is not None:
-                why = f"{why}; the next goal goes to {self.spec.goal_topic}"
+            topic = self.spec.navigation.topic
+            if end.no_actions and topic:
+                why = f"{why}; the next goal goes to {topic}"
             # Some robots answer a cancel by giving up the goal as failed.
             if report.state == "cancelling" and outcome != "reached":
                 outcome, why = "cancelled", report.why
@@ -336,7 +335,8 @@ class Goals:
         """
         if self._by is None or connection not in (None, self._by):
             return
-        if self.spec.on_operator_loss == "cancel" and self._perhaps and self.can_cancel:
+        on_loss = self.spec.navigation.on_operator_loss
+        if on_loss == "cancel" and self._perhaps and self.can_cancel:
             self.cancel(now, "the sender of the goal is gone")
 
     def cancel_unless_reachable(self, spec: RobotSpec, now: float) -> None:
@@ -390,13 +390,13 @@ _DEFAULT_REASONS = {
 }
 
 
-def _goal_places(spec: RobotSpec) -> set[tuple[str | None, str, str]]:
+def _goal_places(spec: RobotSpec) -> set[tuple[str, str, str]]:
     """Return the topics and actions that take and cancel the goals of a robot."""
-    action = "move_base" if is_move_base(spec) else "action"
-    names = {"goal": spec.goal_topic, "cancel": spec.cancel_topic, action: spec.action}
+    action, move = "move_base" if is_move_base(spec) else "action", spec.navigation
+    names = {"goal": move.topic, "cancel": move.cancel_topic, action: move.action}
     return {(spec.goal_url, kind, name) for kind, name in names.items() if name}
 
 
 def is_move_base(spec: RobotSpec) -> bool:
     """Return whether the robot's action is that of ROS 1."""
-    return is_type(spec.action_type, MOVE_BASE)
+    return is_type(spec.navigation.action_type, MOVE_BASE)

@@ -313,10 +313,9 @@ class Machines:
                 self._emit(Attach(key, spec))
                 return
         machine = self._by_key.get(key) or self._new_machine(key)
-        goal_url = spec.goal_url or key.url
-        for url in (key.url, goal_url, spec.bridge_url):
+        for url in (key.url, spec.goal_url, spec.bridge_url):
             self._by_url.setdefault(url, {})[machine] = None
-        tasks = self._link(goal_url, "tasks")
+        tasks = self._link(spec.goal_url, "tasks")
         machine.declare(spec, tasks, self._link(spec.bridge_url, "tasks"), now)
         self._emit(Attach(key, spec))
         if not machine.known:

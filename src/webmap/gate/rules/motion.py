@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from webmap.base.geometry import Twist
 from webmap.gate.actions import Emit, MarkDriven, WriteTwist
 from webmap.gate.events import Key, TwistWritten
-from webmap.gate.limits import PLANE, Axes, Speed, fit, ramp
 from webmap.gate.rules.connections import Lease
 from webmap.gate.rules.delivery import Delivery
+from webmap.gate.specs import PLANE, Axes, Speed, fit, ramp
 
 PERIOD = 0.05
 """Seconds between two zeros."""

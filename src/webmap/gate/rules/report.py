@@ -75,7 +75,7 @@ def report(machine: Machine, spec: RobotSpec, now: float) -> RobotReport:
         reason=reason,
         method=goals.method,
         cancels=goals.can_cancel,
-        locates=spec.pose_topic is not None,
+        locates=spec.initial_pose is not None,
         goal=goals.report,
         hooks=machine.robots.hook_failures,
         check=machine.check.report,
@@ -133,7 +133,7 @@ def _reason(machine: Machine, now: float) -> str | None:
 
 def _link(machine: Machine, spec: RobotSpec) -> LinkHealth:
     """Return the link that moves the robot."""
-    return machine.control if spec.twist_topic else machine.robots.goals[spec.id].link
+    return machine.control if spec.twist else machine.robots.goals[spec.id].link
 
 
 def _stop_source(

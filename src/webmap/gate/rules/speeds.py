@@ -9,7 +9,11 @@ fast link, only the limits of the robot and of the page apply.
 import math
 
 from webmap.gate.events import StopRecord
-from webmap.gate.limits import (
+from webmap.gate.rules.aliases import Aliases
+from webmap.gate.rules.check import PreDriveCheck
+from webmap.gate.rules.health import Ages, LinkHealth
+from webmap.gate.rules.motion import DEADMAN, MotionLimits
+from webmap.gate.specs import (
     STOPS_WITHIN,
     Cap,
     Speed,
@@ -18,10 +22,6 @@ from webmap.gate.limits import (
     page_cap,
     speed_in_force,
 )
-from webmap.gate.rules.aliases import Aliases
-from webmap.gate.rules.check import PreDriveCheck
-from webmap.gate.rules.health import Ages, LinkHealth
-from webmap.gate.rules.motion import DEADMAN, MotionLimits
 
 SLOW = 0.15
 """The age in seconds above which a loop is slow: the speed limit is lower, and the page
@@ -135,8 +135,8 @@ class MachineSpeeds:
         return least(self._caps())
 
     def _caps(self) -> list[Cap]:
-        specs = self._robots.specs.values()
-        own = [cap for spec in specs for cap in caps_of(spec, self.tested)]
+        bases = self._robots.bases
+        own = [cap for base in bases for cap in caps_of(base, self.tested)]
         return own + self._check.caps
 
     @property
