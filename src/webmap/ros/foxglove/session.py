@@ -36,6 +36,7 @@ from webmap.ros.foxglove.protocol import (
     UnadvertiseServices,
     Unknown,
 )
+from webmap.ros.link import report_error, report_malformed
 from webmap.ros.names import normalise_topic, same_type, web_socket_url
 from webmap.ros.received_message import BridgeStats, ReceivedMessage
 from webmap.ros.sockets.connection import BridgeConnection
@@ -479,10 +480,7 @@ class Session:
             return
         self._statuses.add(text)
         if event.level >= ERROR:
-            log.warning("%s: the bridge reports an error: %s", self._name, text)
-            self._report(
-                BridgeError(f"{self._name}: the bridge reports an error: {text}")
-            )
+            report_error(self._name, text, self._report)
         else:
             log.info("%s: the bridge reports: %s", self._name, text)
 
@@ -495,16 +493,9 @@ class Session:
         if self._complained:
             return
         self._complained = True
-        error = ProtocolError(
-            f"{self._name} sent {event.size} bytes that are not Foxglove's protocol: "
-            f"{one_line(event.reason)}"
-        )
-        log.warning("%s", error, extra={"source": self._name})
-        self._report(error)
-        for topic in self.topics.values():
-            for listener in topic.listeners:
-                if listener.mention(error):
-                    return
+        reason = one_line(event.reason)
+        found = f"{event.size} bytes that are not Foxglove's protocol: {reason}"
+        report_malformed(self._name, found, self.topics.values(), self._report)
 
 
 def _fits(topic: Topic, channel: Channel) -> bool:
