@@ -144,8 +144,8 @@ class Session:
         self._subscribed: dict[int, _Subscribed] = {}
         """What the ids of subscriptions mean."""
         self._id_of: dict[str, int] = {}
-        self._calls: dict[int, asyncio.Future[bytes]] = {}
-        self._questions: dict[str, asyncio.Future[ParameterValues]] = {}
+        self._questions: dict[int | str, asyncio.Future[Any]] = {}
+        """What waits for the answers to calls and questions, by their ids."""
         self._server_time = False
         self._statuses: set[str] = set()
         self._complained = False
@@ -203,47 +203,40 @@ class Session:
         A call for a topic that is subscribed applies changes of its listeners.
         """
         self.topics[topic.name] = topic
-        id = self._id_of.get(topic.name)
-        if id is not None:
-            channel = self._subscribed[id].channel
-            if _fits(topic, channel):
-                self._subscribed[id] = _subscribed(topic, channel)
-                return
-            self.unsubscribe(topic)
-            self.topics[topic.name] = topic
-        self._subscribe([topic.name])
+        self._match([topic.name])
 
     def unsubscribe(self, topic: Topic) -> None:
         """End the subscription to a topic."""
         self.topics.pop(topic.name, None)
-        id = self._id_of.pop(topic.name, None)
-        if id is not None:
-            del self._subscribed[id]
-            self._send(protocol.unsubscribe([id]))
+        self._match([topic.name])
 
-    def _subscribe(self, names: Iterable[str]) -> None:
-        """Subscribe to those topics that are wanted, offered and carried here."""
+    def _match(self, names: Iterable[str]) -> None:
+        """Make the subscriptions to topics agree with what is wanted and offered."""
+        gone: list[int] = []
         new: dict[int, int] = {}
-        for name in names:
-            topic = self.topics.get(name)
-            if topic is None or name in self._id_of:
-                continue
-            channel = self._choose(topic)
-            if channel is None:
-                continue
-            if not self._carries(channel.schema_name):
+        for name in dict.fromkeys(names):
+            topic, id = self.topics.get(name), self._id_of.get(name)
+            before = None if id is None else self._subscribed[id].channel
+            fits = [each for each in self.channels_of(name) if _fits(topic, each)]
+            channel = before if before in fits else next(iter(fits), None)
+            if channel is not None and not self._carries(channel.schema_name):
                 self._elsewhere()
+                channel = None
+            if id is not None and before is not None and before != channel:
+                if before.id in self._channels:  # else the server has ended it
+                    gone.append(id)
+                del self._subscribed[id], self._id_of[name]
+                id = None
+            if topic is None or channel is None:
                 continue
-            id = next(self._ids)
-            self._id_of[name] = id
+            if id is None:
+                id = self._id_of[name] = next(self._ids)
+                new[id] = channel.id
             self._subscribed[id] = _subscribed(topic, channel)
-            new[id] = channel.id
+        if gone:
+            self._send(protocol.unsubscribe(gone))
         if new:
             self._send(protocol.subscribe(new))
-
-    def _choose(self, topic: Topic) -> Channel | None:
-        channels = self.channels_of(topic.name)
-        return next((each for each in channels if _fits(topic, each)), None)
 
     # Questions.
 
@@ -256,13 +249,9 @@ class Session:
 
         """
         id = next(self._ids)
-        answer: asyncio.Future[bytes] = asyncio.Future()
-        self._calls[id] = answer
-        try:
-            self.send(protocol.call_service(service.id, id, encoding, request))
-            return await answer
-        finally:
-            self._calls.pop(id, None)
+        call = protocol.call_service(service.id, id, encoding, request)
+        answer: bytes = await self._ask(id, call)
+        return answer
 
     async def set_parameters(
         self, parameters: Iterable[protocol.Parameter]
@@ -274,18 +263,28 @@ class Session:
 
         """
         id = f"webmap-{next(self._ids)}"
-        answer: asyncio.Future[ParameterValues] = asyncio.Future()
-        self._questions[id] = answer
+        answer: ParameterValues = await self._ask(
+            id, protocol.set_parameters(parameters, id)
+        )
+        return answer
+
+    async def _ask(self, id: int | str, question: bytes) -> Any:
+        answer = self._questions[id] = asyncio.Future()
         try:
-            self.send(protocol.set_parameters(parameters, id))
+            self.send(question)
             return await answer
         finally:
             self._questions.pop(id, None)
 
+    def _unanswered(self, id: int | str | None) -> list[asyncio.Future[Any]]:
+        """Return what waits for the answer to a call or a question; of all for None."""
+        found = self._questions.values() if id is None else [self._questions.get(id)]
+        return [each for each in found if each is not None and not each.done()]
+
     @property
     def waits(self) -> bool:
         """Whether a call or a question is not answered yet."""
-        return bool(self._calls or self._questions)
+        return bool(self._questions)
 
     # The connection.
 
@@ -315,13 +314,8 @@ class Session:
 
     def _end(self, error: BridgeClosed) -> None:
         self.failure = error
-        waiting: list[asyncio.Future[Any]] = [
-            *self._calls.values(),
-            *self._questions.values(),
-        ]
-        for answer in waiting:
-            if not answer.done():
-                answer.set_exception(error)
+        for answer in self._unanswered(None):
+            answer.set_exception(error)
         self._forget()
         self._has_changed()
 
@@ -372,13 +366,8 @@ class Session:
 
     def _take_channels(self, event: Advertise) -> None:
         faults, names, left_out = list(event.faults), [], 0
-        for channel in event.channels:
-            if not is_readable(channel):
-                continue
-            if channel.id in self._channels:  # it may have another schema now
-                ended = self._remove([channel.id])
-                if ended:
-                    self._send(protocol.unsubscribe(ended.values()))
+        for channel in filter(is_readable, event.channels):
+            names += self._remove([channel.id])  # it may have another schema now
             if len(self._channels) >= MOST_OFFERED:
                 left_out += 1
                 continue
@@ -391,32 +380,23 @@ class Session:
                 f"{left_out} more channels than {MOST_OFFERED}, which are left out"
             )
         self._complain_about(faults, "channels")
-        self._subscribe(names)
+        self._match(names)
         self._has_changed()
 
     def _drop_channels(self, event: Unadvertise) -> None:
-        self._subscribe(self._remove(event.channel_ids))
+        self._match(self._remove(event.channel_ids))
         self._has_changed()
 
-    def _remove(self, ids: Iterable[int]) -> dict[str, int]:
-        """Forget channels; return the subscriptions that have ended, by topic."""
-        ended = {}
-        for id in ids:
-            channel = self._channels.pop(id, None)
-            if channel is None:
-                continue
+    def _remove(self, ids: Iterable[int]) -> list[str]:
+        """Forget channels; return their topics."""
+        names = []
+        for channel in filter(None, [self._channels.pop(id, None) for id in ids]):
             name = normalise_topic(channel.topic)
-            left = self._by_topic[name]
-            del left[id]
-            if not left:
+            names.append(name)
+            del self._by_topic[name][channel.id]
+            if not self._by_topic[name]:
                 del self._by_topic[name]
-            subscription = self._id_of.get(name)
-            if subscription is None:
-                continue
-            if self._subscribed[subscription].channel.id == id:
-                del self._subscribed[subscription], self._id_of[name]
-                ended[name] = subscription
-        return ended
+        return names
 
     def _take_services(self, event: AdvertiseServices) -> None:
         faults = list(event.faults)
@@ -456,18 +436,15 @@ class Session:
         self._has_changed()
 
     def _take_parameters(self, event: ParameterValues) -> None:
-        answer = self._questions.get(event.id or "")
-        if answer is not None and not answer.done():
+        for answer in self._unanswered(event.id or ""):
             answer.set_result(event)
 
     def _take_response(self, event: ServiceCallResponse) -> None:
-        answer = self._calls.get(event.call_id)
-        if answer is not None and not answer.done():
+        for answer in self._unanswered(event.call_id):
             answer.set_result(event.payload)
 
     def _take_failure(self, event: ServiceCallFailure) -> None:
-        answer = self._calls.get(event.call_id)
-        if answer is not None and not answer.done():
+        for answer in self._unanswered(event.call_id):
             answer.set_exception(ServiceError(one_line(event.message)))
 
     def _take_time(self, event: Time) -> None:
@@ -498,7 +475,9 @@ class Session:
         report_malformed(self._name, found, self.topics.values(), self._report)
 
 
-def _fits(topic: Topic, channel: Channel) -> bool:
+def _fits(topic: Topic | None, channel: Channel) -> bool:
+    if topic is None:
+        return False
     stated = topic.message_type
     return stated is None or same_type(stated, channel.schema_name)
 
