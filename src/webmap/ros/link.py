@@ -75,9 +75,6 @@ class _Graph(Protocol):
     ) -> list[str] | None:
         """Return the names of the nodes of a kind."""
 
-    async def other_publishers(self, topic: str) -> list[str] | None:
-        """Return the publishers without those that publish for WebMap."""
-
     async def definitions(self, type: str, kind: str) -> Definitions:
         """Return the definitions of a type: see :meth:`webmap.Bridge.definitions`."""
 

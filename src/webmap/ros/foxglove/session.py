@@ -17,25 +17,6 @@ from webmap.ros.foxglove.messages import (
     format_of_channel,
     is_readable,
 )
-from webmap.ros.foxglove.protocol import (
-    Advertise,
-    AdvertiseServices,
-    Channel,
-    ConnectionGraphUpdate,
-    Event,
-    Malformed,
-    MessageData,
-    ParameterValues,
-    ServerInfo,
-    Service,
-    ServiceCallFailure,
-    ServiceCallResponse,
-    Status,
-    Time,
-    Unadvertise,
-    UnadvertiseServices,
-    Unknown,
-)
 from webmap.ros.link import report_error, report_malformed
 from webmap.ros.names import normalise_topic, same_type, web_socket_url
 from webmap.ros.received_message import BridgeStats, ReceivedMessage
@@ -59,7 +40,7 @@ T = TypeVar("T")
 
 class _Subscribed(NamedTuple):
     topic: Topic
-    channel: Channel
+    channel: protocol.Channel
     message: Callable[[str, bytes | bytearray], ReceivedMessage]
     """Makes a message of its topic and its frame."""
 
@@ -99,8 +80,8 @@ class Session:
         elsewhere: Callable[[], None] = lambda: None,
         again: bool = True,
     ) -> None:
-        self.info: ServerInfo | None = None
-        self.services: dict[str, Service] = {}
+        self.info: protocol.ServerInfo | None = None
+        self.services: dict[str, protocol.Service] = {}
         self.publishers: dict[str, list[str]] = {}
         self.subscribers: dict[str, list[str]] = {}
         self.failure: BridgeClosed | None = None
@@ -139,8 +120,8 @@ class Session:
         self.services = {}
         self.publishers, self.subscribers = {}, {}
         self.time = None
-        self._channels: dict[int, Channel] = {}
-        self._by_topic: dict[str, dict[int, Channel]] = {}
+        self._channels: dict[int, protocol.Channel] = {}
+        self._by_topic: dict[str, dict[int, protocol.Channel]] = {}
         self._subscribed: dict[int, _Subscribed] = {}
         """What the ids of subscriptions mean."""
         self._id_of: dict[str, int] = {}
@@ -156,7 +137,7 @@ class Session:
 
     # What the server offers.
 
-    def channels_of(self, topic: str) -> Iterable[Channel]:
+    def channels_of(self, topic: str) -> Iterable[protocol.Channel]:
         """Return the readable channels of a topic."""
         return self._by_topic.get(topic, {}).values()
 
@@ -167,7 +148,7 @@ class Session:
             for topic, channels in self._by_topic.items()
         }
 
-    def channel_with(self, type: str) -> Channel | None:
+    def channel_with(self, type: str) -> protocol.Channel | None:
         """Return a channel that has the schema of a type, if there is one."""
         for channel in self._channels.values():
             if channel.schema and same_type(channel.schema_name, type):
@@ -240,7 +221,9 @@ class Session:
 
     # Questions.
 
-    async def call(self, service: Service, encoding: str, request: bytes) -> bytes:
+    async def call(
+        self, service: protocol.Service, encoding: str, request: bytes
+    ) -> bytes:
         """Call a service and return the bytes of its response.
 
         Raises:
@@ -255,7 +238,7 @@ class Session:
 
     async def set_parameters(
         self, parameters: Iterable[protocol.Parameter]
-    ) -> ParameterValues:
+    ) -> protocol.ParameterValues:
         """Set parameters and return their new values.
 
         Raises:
@@ -263,7 +246,7 @@ class Session:
 
         """
         id = f"webmap-{next(self._ids)}"
-        answer: ParameterValues = await self._ask(
+        answer: protocol.ParameterValues = await self._ask(
             id, protocol.set_parameters(parameters, id)
         )
         return answer
@@ -303,9 +286,7 @@ class Session:
         self._has_changed()
 
     def _closed(self, reason: str) -> None:
-        error = BridgeClosed(f"{self.connection.url}: {reason}")
-        error.why = reason
-        self._end(error)
+        self._end(BridgeClosed(f"{self.connection.url}: {reason}", reason))
         self._on_close(reason)
 
     def _failed(self, error: BridgeClosed) -> None:
@@ -332,15 +313,17 @@ class Session:
             try:
                 size, frame = whole_of(frame)
             except ProtocolError as error:
-                self._other(Malformed(str(error), size))
+                self._other(protocol.Malformed(str(error), size))
                 return
         event = protocol.receive(frame)
-        if isinstance(event, MessageData):
+        if isinstance(event, protocol.MessageData):
             self._message(event, frame, size)
         else:
             self._other(event)
 
-    def _message(self, event: MessageData, frame: bytes | bytearray, size: int) -> None:
+    def _message(
+        self, event: protocol.MessageData, frame: bytes | bytearray, size: int
+    ) -> None:
         subscribed = self._subscribed.get(event.subscription_id)
         if subscribed is None:
             return  # it was on its way when the subscription ended
@@ -350,12 +333,12 @@ class Session:
         message.size = size
         self._on_message(subscribed.topic, message)
 
-    def _other(self, event: Event) -> None:
+    def _other(self, event: protocol.Event) -> None:
         handle = _HANDLERS.get(type(event))
         if handle is not None:
             handle(self, event)
 
-    def _take_info(self, event: ServerInfo) -> None:
+    def _take_info(self, event: protocol.ServerInfo) -> None:
         first, self.info = self.info is None, event
         if not first:  # only its session is new
             return
@@ -364,7 +347,7 @@ class Session:
         self._informed()
         self._has_changed()
 
-    def _take_channels(self, event: Advertise) -> None:
+    def _take_channels(self, event: protocol.Advertise) -> None:
         faults, names, left_out = list(event.faults), [], 0
         for channel in filter(is_readable, event.channels):
             names += self._remove([channel.id])  # it may have another schema now
@@ -383,7 +366,7 @@ class Session:
         self._match(names)
         self._has_changed()
 
-    def _drop_channels(self, event: Unadvertise) -> None:
+    def _drop_channels(self, event: protocol.Unadvertise) -> None:
         self._match(self._remove(event.channel_ids))
         self._has_changed()
 
@@ -398,7 +381,7 @@ class Session:
                 del self._by_topic[name]
         return names
 
-    def _take_services(self, event: AdvertiseServices) -> None:
+    def _take_services(self, event: protocol.AdvertiseServices) -> None:
         faults = list(event.faults)
         room = MOST_OFFERED - len(self.services)
         if len(event.services) > room:
@@ -408,7 +391,7 @@ class Session:
         self._complain_about(faults, "services")
         self._has_changed()
 
-    def _drop_services(self, event: UnadvertiseServices) -> None:
+    def _drop_services(self, event: protocol.UnadvertiseServices) -> None:
         gone = set(event.service_ids)
         self.services = {
             name: each for name, each in self.services.items() if each.id not in gone
@@ -423,7 +406,7 @@ class Session:
             log.warning("%s", text)
             self._report(ProtocolError(text))
 
-    def _take_graph(self, event: ConnectionGraphUpdate) -> None:
+    def _take_graph(self, event: protocol.ConnectionGraphUpdate) -> None:
         for published in event.published_topics:
             self.publishers[published.name] = published.publisher_ids
         for subscribed in event.subscribed_topics:
@@ -435,23 +418,23 @@ class Session:
             self.publishers, self.subscribers = {}, {}  # nothing is known, then
         self._has_changed()
 
-    def _take_parameters(self, event: ParameterValues) -> None:
+    def _take_parameters(self, event: protocol.ParameterValues) -> None:
         for answer in self._unanswered(event.id or ""):
             answer.set_result(event)
 
-    def _take_response(self, event: ServiceCallResponse) -> None:
+    def _take_response(self, event: protocol.ServiceCallResponse) -> None:
         for answer in self._unanswered(event.call_id):
             answer.set_result(event.payload)
 
-    def _take_failure(self, event: ServiceCallFailure) -> None:
+    def _take_failure(self, event: protocol.ServiceCallFailure) -> None:
         for answer in self._unanswered(event.call_id):
             answer.set_exception(ServiceError(one_line(event.message)))
 
-    def _take_time(self, event: Time) -> None:
+    def _take_time(self, event: protocol.Time) -> None:
         self._server_time = True
         self.time = (event.time, time.monotonic())
 
-    def _take_status(self, event: Status) -> None:
+    def _take_status(self, event: protocol.Status) -> None:
         text = one_line(event.message)
         if text in self._statuses or len(self._statuses) >= MOST_STATUSES:
             return
@@ -461,10 +444,10 @@ class Session:
         else:
             log.info("%s: the bridge reports: %s", self._name, text)
 
-    def _count(self, _event: Unknown) -> None:
+    def _count(self, _event: protocol.Unknown) -> None:
         self._stats.unknown += 1
 
-    def _complain(self, event: Malformed) -> None:
+    def _complain(self, event: protocol.Malformed) -> None:
         """Report a frame that is not Foxglove's protocol, also to one subscriber."""
         self._stats.malformed += 1
         if self._complained:
@@ -475,31 +458,31 @@ class Session:
         report_malformed(self._name, found, self.topics.values(), self._report)
 
 
-def _fits(topic: Topic | None, channel: Channel) -> bool:
+def _fits(topic: Topic | None, channel: protocol.Channel) -> bool:
     if topic is None:
         return False
     stated = topic.message_type
     return stated is None or same_type(stated, channel.schema_name)
 
 
-def _subscribed(topic: Topic, channel: Channel) -> _Subscribed:
+def _subscribed(topic: Topic, channel: protocol.Channel) -> _Subscribed:
     raw = topic.options().encoding == "raw"
     kind, format = RawMessage if raw else FoxgloveMessage, format_of_channel(channel)
     return _Subscribed(topic, channel, partial(kind, format=format))
 
 
 _HANDLERS: dict[type[Any], Callable[[Session, Any], None]] = {
-    ServerInfo: Session._take_info,
-    Status: Session._take_status,
-    Advertise: Session._take_channels,
-    Unadvertise: Session._drop_channels,
-    AdvertiseServices: Session._take_services,
-    UnadvertiseServices: Session._drop_services,
-    ParameterValues: Session._take_parameters,
-    ConnectionGraphUpdate: Session._take_graph,
-    ServiceCallFailure: Session._take_failure,
-    ServiceCallResponse: Session._take_response,
-    Time: Session._take_time,
-    Unknown: Session._count,
-    Malformed: Session._complain,
+    protocol.ServerInfo: Session._take_info,
+    protocol.Status: Session._take_status,
+    protocol.Advertise: Session._take_channels,
+    protocol.Unadvertise: Session._drop_channels,
+    protocol.AdvertiseServices: Session._take_services,
+    protocol.UnadvertiseServices: Session._drop_services,
+    protocol.ParameterValues: Session._take_parameters,
+    protocol.ConnectionGraphUpdate: Session._take_graph,
+    protocol.ServiceCallFailure: Session._take_failure,
+    protocol.ServiceCallResponse: Session._take_response,
+    protocol.Time: Session._take_time,
+    protocol.Unknown: Session._count,
+    protocol.Malformed: Session._complain,
 }

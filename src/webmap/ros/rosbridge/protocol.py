@@ -111,17 +111,6 @@ class _Assembly:
             self.messages = max(self.messages, 2)
         self.pieces[fragment.num] = data
 
-    @property
-    def is_complete(self) -> bool:
-        return self.received >= self.count * self.messages
-
-    @property
-    def is_ambiguous(self) -> bool:
-        return self.messages > 1
-
-    def text(self) -> bytes:
-        return b"".join(self.pieces[num] for num in range(self.count))
-
 
 class Fragments:
     """The messages of one connection that came in part (rosbridge protocol, 2.2.2).
@@ -170,15 +159,15 @@ class Fragments:
             self._bound_open()
         assembly.add(fragment)
         self._bound_bytes(key)
-        if not assembly.is_complete:
+        if assembly.received < assembly.count * assembly.messages:
             return None
         del self._open[key]
-        if assembly.is_ambiguous:
+        if assembly.messages > 1:
             raise ProtocolError(
                 f"{assembly.messages} messages of {assembly.count} fragments each "
                 f"interleave under id {fragment.id!r}: they cannot be distinguished"
             )
-        return assembly.text()
+        return b"".join(assembly.pieces[num] for num in range(assembly.count))
 
     def _check(self, fragment: TextFragment) -> None:
         if not math.isfinite(fragment.total) or fragment.count < 1:
