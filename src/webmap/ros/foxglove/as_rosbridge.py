@@ -171,21 +171,21 @@ class RosbridgeOfFoxglove(BridgeConnection):
         if self.state != "open":
             return
         self._end_subscriptions()
-        self.state = "connecting" if self._again else "closed"
+        self._end_unless_again()
         self._closed(reason)
-        if not self._again:
-            self._spawn(self._bridge.stop())
 
     def _bridge_failed(self, error: Exception) -> None:
         if self.state == "open":
             self._give({"op": "status", "level": "error", "msg": str(error)})
             return
-        if not isinstance(error, BridgeClosed):
-            return
+        if isinstance(error, BridgeClosed):
+            self._end_unless_again()
+            self._failed(error)
+
+    def _end_unless_again(self) -> None:
+        self.state = "connecting" if self._again else "closed"
         if not self._again:
-            self.state = "closed"
             self._spawn(self._bridge.stop())
-        self._failed(error)
 
     def _end_subscriptions(self) -> None:
         for subscription in self._subscribed.values():

@@ -158,25 +158,19 @@ class ParameterValues(Struct, frozen=True):
     """That of the request."""
 
 
-class Published(Struct, frozen=True, rename="camel"):
-    """The nodes that publish a topic, in place of those known before."""
+class TopicNodes(Struct, frozen=True, rename="camel"):
+    """The nodes that publish or subscribe to a topic, in place of those before."""
 
     name: str
     publisher_ids: list[str] = []
-
-
-class Subscribed(Struct, frozen=True, rename="camel"):
-    """The nodes that subscribe to a topic, in place of those known before."""
-
-    name: str
     subscriber_ids: list[str] = []
 
 
 class ConnectionGraphUpdate(Struct, frozen=True, rename="camel"):
     """The changes of the graph of nodes that WebMap uses."""
 
-    published_topics: list[Published] = []
-    subscribed_topics: list[Subscribed] = []
+    published_topics: list[TopicNodes] = []
+    subscribed_topics: list[TopicNodes] = []
     removed_topics: list[str] = []
 
 

@@ -5,6 +5,7 @@ import io
 import math
 from array import array
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import cbor2
@@ -33,19 +34,17 @@ _ARRAY_TAGS = {
 _NAN = msgspec.Raw(b"NaN")
 
 
+@dataclass(slots=True, eq=False)
 class Publication:
     """A message on a topic; each encoding is made once for all subscribers."""
 
-    __slots__ = ("_forms", "message", "stamp", "topic", "type")
+    topic: str
+    type: str
+    message: dict[str, Any]
+    stamp: float
+    """When it was published, in seconds since 1970."""
 
-    def __init__(
-        self, topic: str, type_name: str, message: dict[str, Any], stamp: float
-    ) -> None:
-        self.topic = topic
-        self.type = type_name
-        self.message = message
-        self.stamp = stamp
-        self._forms: dict[str, str | bytes | None] = {}
+    _forms: dict[str, str | bytes | None] = field(default_factory=dict, init=False)
 
     def form(self, compression: str, encoder: "Encoder") -> str | bytes | None:
         """Return the frame, or None if this server cannot send that encoding."""
