@@ -169,7 +169,7 @@ async def tried(seen: BridgeFacts) -> BridgeFacts:
     elif not is_rosbridge_url(seen.url):
         why = "it is a test of a rosbridge"
     elif seen.unlisted:
-        why = "rosapi does not answer"
+        return replace(seen, link=checks.not_tried(seen.link))
     else:
         return replace(seen, link=await checks.tried_a_call(seen.link, seen.url))
     return replace(seen, link=checks.not_tried(seen.link, why))

@@ -134,7 +134,7 @@ async def tried_a_call(facts: LinkFacts, url: str) -> LinkFacts:
     return replace(facts, calls_in_threads=free, tried=True, no_result="")
 
 
-def not_tried(facts: LinkFacts, why: str) -> LinkFacts:
+def not_tried(facts: LinkFacts, why: str = "rosapi does not answer") -> LinkFacts:
     """Return the facts after a call could not be tried."""
     if facts.tried:  # the earlier result may be outdated
         facts = replace(facts, calls_in_threads=None, tried=False)
