@@ -92,9 +92,6 @@ class LinesGraph:
     ) -> list[str] | None:
         return None
 
-    async def other_publishers(self, topic: str) -> list[str] | None:
-        return None
-
     async def definitions(self, type: str, kind: str) -> Definitions:
         raise ServiceError("the robot sends no definitions")
 

@@ -194,7 +194,7 @@ def test_a_display_calls_services_that_only_read(bench):
         ops.call_service("/rosapi/set_param", {"name": "x", "value": "1"}, id="7"),
         ops.call_service("/dock", id="7"),
         ops.advertise("/cmd_vel", "geometry_msgs/Twist", id="7"),
-        ops.publish("/cmd_vel", {"linear": {"x": 1.0}}, id="7"),
+        b'{"op":"publish","id":"7","topic":"/cmd_vel","msg":{"linear":{"x":1.0}}}',
         b'{"op":"send_action_goal","action":"/go","id":"7"}',
         b'{"op":"call_service","service":"/rosapi/topics/../set_param","id":"7"}',
     ],

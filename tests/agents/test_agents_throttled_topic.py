@@ -139,6 +139,7 @@ def test_a_connection_listens_to_a_topic_until_its_last_subscription_ends(clock)
         failed=print,
     )
     lane._peer, lane._loop, lane._key_in, lane.state = Peer(), clock, "key", "open"
+    lane._task = "runs"
     peer = lane._peer
     lane.send(ops.subscribe("/scan", id="1", throttle_rate=100))
     ((key, arrived),) = peer.listeners.values()

@@ -1,6 +1,7 @@
-"""Conversions between rosbridge messages and rosbags messages, in both directions."""
+"""Messages of a rosbridge that are written to bags, and read from them."""
 
 import base64
+import contextlib
 import math
 from array import array
 
@@ -11,7 +12,7 @@ from rosbags.typesys import get_types_from_msg
 from equipment.bag_files import BEGIN, Made, types_of
 from webmap.bags.recording import Recording
 from webmap.bags.times import Stamps
-from webmap.bags.types import MessageConverter, texts_of
+from webmap.bags.types import texts_of
 from webmap.ros.definitions import Definitions, UnknownType
 from webmap.ros.message_check import Misfit
 from webmap.ros.rosbridge.server.dialect import Dialect
@@ -25,17 +26,12 @@ def version_of(made, type_name):
     return next(types_of(made.dialect).versions(type_name))
 
 
-def again(made, type_name, message):
-    """Return a message after a conversion to rosbags' bytes and back."""
-    version = version_of(made, type_name)
-    read = (
-        version.store.deserialize_ros1
-        if made.dialect == "ros1"
-        else version.store.deserialize_cdr
-    )
-    made.schema.define(texts_of(version.store, version.type_name))
-    value = read(version.bytes_of(message), version.type_name)
-    return MessageConverter(made.schema).message(type_name, value)
+def again(made, folder, type_name, message):
+    """Return a message after it was written to a bag and read from there."""
+    bag = made.bag(folder / "again", ("/again", type_name, 0.0, message))
+    with contextlib.closing(Recording([bag])) as recording:
+        (recorded,) = recording.messages(BEGIN)
+        return recording.message(recorded)
 
 
 def plain(value):
@@ -59,9 +55,11 @@ def plain(value):
         ("std_msgs/Empty", {}),
     ],
 )
-def test_a_message_is_unchanged_after_writing_and_reading(made, type_name, fields):
+def test_a_message_is_unchanged_after_writing_and_reading(
+    made, tmp_path, type_name, fields
+):
     message = made.message(type_name, **fields)
-    assert plain(again(made, type_name, message)) == plain(message)
+    assert plain(again(made, tmp_path, type_name, message)) == plain(message)
 
 
 def test_arrays_from_cbor_and_lists_from_json_give_the_same_bytes(made):
@@ -80,9 +78,9 @@ def test_base64_text_and_plain_bytes_give_the_same_bytes(made):
     )
 
 
-def test_null_in_json_becomes_nan(made):
+def test_null_in_json_becomes_nan(made, tmp_path):
     scan = made.message(SCAN) | {"ranges": [None, 2.0], "range_max": None}
-    read = again(made, SCAN, scan)
+    read = again(made, tmp_path, SCAN, scan)
     assert math.isnan(read["ranges"][0])
     assert read["ranges"][1] == 2.0
     assert math.isnan(read["range_max"])

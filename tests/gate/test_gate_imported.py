@@ -116,7 +116,6 @@ def test_rosbridge_operations_are_encoded_as_json_or_raise_an_error() -> None:
         "level": "info",
         "msg": "ready",
     }
-    assert msgspec.json.decode(ops.set_level("none"))["level"] == "none"
     deep: list[object] = []
     for _ in range(100_000):
         deep = [deep]

@@ -4,11 +4,13 @@ import json
 import math
 
 import pytest
+from link_bench import in_loop
 
 from equipment.gate_harness import KEY, spec
 from webmap.base.geometry import Twist
 from webmap.gate.actions import SendGoal, SendPose
 from webmap.gate.lanes import rosbridge
+from webmap.gate.lanes.wires import wire_to
 
 
 def decoded(data):
@@ -110,18 +112,27 @@ def test_an_action_goal_is_sent_with_send_action_goal():
     assert received["args"]["pose"]["header"]["stamp"] == {"sec": 0, "nanosec": 0}
 
 
-def test_cancels_hooks_and_poses_are_encoded():
+@in_loop
+async def test_cancels_hooks_and_poses_are_encoded():
+    wire = wire_to("ws://127.0.0.1:9", up=print, down=print, text=print)
     assert rosbridge.cancel_message("/cancel") == ("/cancel", rosbridge.GOAL_ID, {})
-    cancel = decoded(rosbridge.cancel_by_service("/go", "c1"))
+    cancel = decoded(wire.cancel_call("/go").hello)
     assert cancel["service"] == "/go/_action/cancel_goal"
+    assert (cancel["type"], cancel["args"]) == (
+        "action_msgs/srv/CancelGoal",
+        {"goal_info": {}},
+    )
     flag = rosbridge.flag("/lock", "std_msgs/Bool", True)
     assert flag == ("/lock", "std_msgs/Bool", {"data": True})
-    call = decoded(rosbridge.trigger("/e_stop", "std_srvs/Trigger", "t1"))
-    assert (call["op"], call["service"], call["id"]) == (
+    call = decoded(wire.trigger_call("/e_stop", "std_srvs/Trigger").hello)
+    assert (call["op"], call["service"], call["type"], call["args"]) == (
         "call_service",
         "/e_stop",
-        "t1",
+        "std_srvs/Trigger",
+        {},
     )
+    assert call["id"] != cancel["id"]
+    wire.lane.close()
     located = spec(pose_topic="/initialpose", pose_covariance=(0.1, 0.2, 0.3))
     at = SendPose(KEY, "r1", 1.0, 2.0, 0.0, "a")
     topic, _, message = rosbridge.pose_estimate(located, at)

@@ -162,21 +162,15 @@ def agents_behind(
     finally:
         peer.unlisten(number)
     if trouble is not None:
-        raise _closed(trouble, trouble)
+        raise BridgeClosed(trouble, trouble)
     if not names:
         why = f"no agent is at {url}{peer.user.may_not}"
-        raise _closed(
-            why,
+        raise BridgeClosed(
             f"{why}; start one beside the robot: webmap agent ws://localhost:9090 "
             f"--router {url} --name NAME",
+            why,
         )
     return [f"{url}/{name}" for name in sorted(names)]
-
-
-def _closed(why: str, text: str) -> BridgeClosed:
-    closed = BridgeClosed(text)
-    closed.why = why
-    return closed
 
 
 def one_agent(

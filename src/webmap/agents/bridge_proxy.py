@@ -22,6 +22,7 @@ from webmap.agents.data_messages import (
     Ping,
     Pong,
     SubscribeOp,
+    read_json,
     read_op,
     unpack,
 )
@@ -71,8 +72,8 @@ class TopicOptions(NamedTuple):
     """What one display wants of a topic, or what the agent wants for all of them."""
 
     type: str | None
-    throttle: int
-    queue: int
+    throttle_rate: int
+    queue_length: int
     compression: str | None
 
 
@@ -110,7 +111,7 @@ class SharedTopic:
         least, compression = least_throttle, "none"
         if each_counts(self.name, type):
             least = 0
-        queue = min(max(each.queue for each in options), ops.BURST)
+        queue = min(max(each.queue_length for each in options), ops.BURST)
         if type and is_type(type, *REPLACED, "sensor_msgs/LaserScan"):
             least, queue = max(least, LEAST_THROTTLE), 1
         in_text = any(each.compression == "none" for each in options)
@@ -120,7 +121,7 @@ class SharedTopic:
             least = max(least, THROTTLE)
         elif type and is_type(type, *BULK):
             compression = "cbor"
-        throttle = max(min(each.throttle for each in options), least)
+        throttle = max(min(each.throttle_rate for each in options), least)
         return TopicOptions(type, throttle, queue, compression)
 
 
@@ -386,16 +387,8 @@ class BridgeProxy:
         self._numbers += 1
         topic.number, topic.sent, topic.changed_at = self._numbers, options, now
         topic.count, topic.newest = 0, b""
-        self._upstream(
-            ops.subscribe(
-                topic.name,
-                id=f"agent-{topic.number}",
-                type=options.type,
-                throttle_rate=options.throttle,
-                queue_length=options.queue,
-                compression=options.compression,
-            )
-        )
+        id = f"agent-{topic.number}"
+        self._upstream(ops.subscribe(topic.name, id=id, **options._asdict()))
 
     def _unsubscribe(
         self, name: str, client: Sender, id: str | None, now: float
@@ -444,7 +437,5 @@ def args_of(call: Call) -> object:
         WireError: If they are not JSON.
 
     """
-    try:
-        return msgspec.json.decode(call.args)
-    except (ValueError, RecursionError) as error:
-        raise WireError(f"got arguments that cannot be read: {error}") from error
+    arguments: object = read_json(msgspec.json.decode, call.args, "arguments")
+    return arguments

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import msgspec
 
+from webmap.agents.data_messages import read_json
 from webmap.base.errors import WireError
 from webmap.ros.messages_image import MAX_BYTES
 
@@ -76,10 +77,7 @@ def read_request(piece: bytes) -> CameraRequest | CameraRelease:
     """
     if len(piece) > MOST_REQUEST:
         raise WireError(f"got a request of {len(piece)} bytes, {MOST_REQUEST} at most")
-    try:
-        request: CameraRequest | CameraRelease = _request(piece)
-    except ValueError as error:
-        raise WireError(f"got a request that cannot be read: {error}") from error
+    request: CameraRequest | CameraRelease = read_json(_request, piece, "a request")
     return request
 
 
@@ -90,11 +88,7 @@ def read_reply(piece: bytes) -> CameraReply:
         WireError: If the bytes are none.
 
     """
-    try:
-        reply: CameraReply = _reply(piece)
-    except ValueError as error:
-        raise WireError(f"got an answer that cannot be read: {error}") from error
-    return reply
+    return read_json(_reply, piece, "an answer")
 
 
 def pack_picture(picture: PictureMessage) -> bytes:

@@ -7,12 +7,15 @@ beams if the agent has a limit.
 
 import math
 import zlib
-from typing import Annotated, Any, Literal, TypeAlias
+from collections.abc import Callable
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
 import msgspec
 
 from webmap.base.errors import ProtocolError, WireError
 from webmap.ros.rosbridge.cbor import decode, looks_like_cbor
+
+T = TypeVar("T")
 
 NOTE, FRAME, PACKED = b"\0", b"\1", b"\2"
 
@@ -137,6 +140,24 @@ class SubscribeOp(msgspec.Struct, omit_defaults=True):
 _op = msgspec.json.Decoder(SubscribeOp).decode
 
 
+def read_json(decode: Callable[[bytes], T], text: bytes, name: str) -> T:
+    """Return what a decoder makes of JSON.
+
+    Args:
+        decode: The decoder.
+        text: The JSON.
+        name: What the text is, for the error.
+
+    Raises:
+        WireError: If it cannot be read.
+
+    """
+    try:
+        return decode(text)
+    except (ValueError, RecursionError) as error:
+        raise WireError(f"got {name} that cannot be read: {error}") from error
+
+
 def read_op(frame: bytes) -> SubscribeOp:
     """Return an operation of a display.
 
@@ -144,10 +165,7 @@ def read_op(frame: bytes) -> SubscribeOp:
         WireError: If it is not one of rosbridge.
 
     """
-    try:
-        return _op(frame)
-    except (ValueError, RecursionError) as error:
-        raise WireError(f"got an operation that cannot be read: {error}") from error
+    return read_json(_op, frame, "an operation")
 
 
 def lean_scan(frame: bytes | bytearray, beams: int | None) -> bytes | bytearray:

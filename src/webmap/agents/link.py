@@ -294,17 +294,9 @@ class AgentConnection(BridgeConnection):
             if self._liveness is not None and received.number == self._pings:
                 self._liveness.ponged(self._heard)
 
-    def _deliver(self, frame: bytes | bytearray) -> None:
-        try:
-            self._received(frame)
-        except Exception:
-            log.exception("%s: a frame of %d bytes was lost", self.url, len(frame))
-
 
 def _not_reached(url: str, why: str) -> BridgeClosed:
-    closed = BridgeClosed(f"cannot reach the agent at {url}: {why}")
-    closed.why = why
-    return closed
+    return BridgeClosed(f"cannot reach the agent at {url}: {why}", why)
 
 
 class AgentLink(RosbridgeLink):

@@ -11,6 +11,7 @@ from webmap.ros.rosbridge.server.dialect import DialectName
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
     from rosbags.interfaces import Connection
+    from rosbags.typesys.store import Typestore
 
     from webmap.bags.mcap_file import McapFile
 
@@ -109,14 +110,12 @@ def opened(
     from rosbags.highlevel import AnyReader
     from rosbags.rosbag2 import Reader
     from rosbags.rosbag2.reader import DirectoryReader
-    from rosbags.typesys import Stores, get_typestore
 
     from webmap.bags.mcap_file import McapFile
 
-    # Bags of ROS 2 hold the definitions of their types only since Iron.
-    default = Stores.ROS1_NOETIC if dialect == "ros1" else Stores.ROS2_HUMBLE
     try:
-        reader = AnyReader([*paths], default_typestore=get_typestore(default))
+        # Bags of ROS 2 hold the definitions of their types only since Iron.
+        reader = AnyReader([*paths], default_typestore=_usual_types(dialect))
         for each in reader.readers:
             if isinstance(each, Reader) and isinstance(each.storage, DirectoryReader):
                 each.storage.STORAGE_PLUGINS = {
@@ -164,14 +163,20 @@ def is_json(connection: "Connection") -> bool:
 
 def add_defaults(reader: "AnyReader", dialect: DialectName) -> None:
     """Add the common types that the file itself does not define to a reader."""
-    from rosbags.typesys import Stores, get_typestore
-
     known = reader.typestore.fielddefs
     if all(connection.msgtype in known for connection in reader.connections):
         return
-    default = Stores.ROS1_NOETIC if dialect == "ros1" else Stores.ROS2_HUMBLE
-    usual = get_typestore(default).fielddefs
+    usual = _usual_types(dialect).fielddefs
     reader.typestore.register({n: usual[n] for n in usual if n not in known})
+
+
+def _usual_types(dialect: DialectName) -> "Typestore":
+    """Return the types of a release in which most recordings can be read."""
+    from rosbags.typesys import Stores, get_typestore
+
+    return get_typestore(
+        Stores.ROS1_NOETIC if dialect == "ros1" else Stores.ROS2_HUMBLE
+    )
 
 
 def is_latched_in_file(connection: "Connection") -> bool:

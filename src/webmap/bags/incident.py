@@ -35,6 +35,7 @@ from webmap.bags.ring import (
 from webmap.bags.times import SECOND
 from webmap.bags.types import Types
 from webmap.base.errors import ConfigError
+from webmap.base.geometry import Twist
 from webmap.base.text import one_line
 
 LEVELS = {"alarm": 30, "stop": 30}
@@ -101,7 +102,7 @@ def _odometry(space: str, record: PoseRecord) -> Line:
         "child_frame_id": f"{space}/base_link",
         "pose": {"pose": _pose(record.place), "covariance": [0.0] * 36},
         "twist": {
-            "twist": _velocity(record.measured or ZERO),
+            "twist": Twist(*record.measured or ZERO).to_message(),
             "covariance": [0.0] * 36,
         },
     }
@@ -110,7 +111,7 @@ def _odometry(space: str, record: PoseRecord) -> Line:
 
 def _twist(time: int, space: str, value: Velocity) -> tuple[str, int, dict[str, Any]]:
     header = _header(time, f"{space}/base_link")
-    message = {"header": header, "twist": _velocity(value)}
+    message = {"header": header, "twist": Twist(*value).to_message()}
     return "geometry_msgs/TwistStamped", time, message
 
 
@@ -165,14 +166,6 @@ def _pose(place: Place) -> dict[str, Any]:
     return {
         "position": {"x": x, "y": y, "z": z},
         "orientation": {"x": qx, "y": qy, "z": qz, "w": qw},
-    }
-
-
-def _velocity(value: Velocity) -> dict[str, Any]:
-    x, y, turn, z, rx, ry = value
-    return {
-        "linear": {"x": x, "y": y, "z": z},
-        "angular": {"x": rx, "y": ry, "z": turn},
     }
 
 

@@ -26,14 +26,8 @@ from webmap.bags.recording import FRAMES, AllFrames, Recorded, Recording, is_sta
 from webmap.bags.times import SECOND, Pace, Stamps
 from webmap.base.errors import ConfigError
 from webmap.ros.rosbridge.server.dialect import POLITE
-from webmap.ros.rosbridge.server.graph import (
-    BRIDGE_NODE,
-    Deliver,
-    Graph,
-    GraphError,
-)
+from webmap.ros.rosbridge.server.graph import Graph
 from webmap.ros.rosbridge.server.rosapi import Rosapi
-from webmap.ros.rosbridge.server.schema import Schema
 
 if TYPE_CHECKING:
     from webmap.bags.foxglove_server import FoxgloveServer
@@ -46,48 +40,11 @@ NODE = "/recording"
 REFUSED = "this is a recording: it accepts no messages, services or actions"
 
 
-class ReplayGraph(Graph):
-    """A ROS graph that accepts no publishers or services once it is sealed.
-
-    Clients may subscribe and ask questions; no node would follow their commands.
-    """
-
-    def __init__(self, schema: Schema, *, clock: Callable[[], float]) -> None:
-        super().__init__(schema, clock=clock)
-        self.subscribed = asyncio.Event()
-        """Set at the first subscription."""
-        self._sealed = False
-
-    def seal(self) -> None:
-        """Refuse all new publishers and services from now on."""
-        self._sealed = True
-
-    def refuse_new(self) -> None:
-        """Refuse a new publisher or service once the graph is sealed."""
-        if self._sealed:
-            raise GraphError(REFUSED)
-
-    def subscribe(
-        self,
-        owner: object,
-        name: str,
-        deliver: Deliver,
-        type_name: str | None = None,
-        *,
-        node: str = BRIDGE_NODE,
-    ) -> None:
-        """Subscribe ``owner`` to a topic, and deliver its latched messages.
-
-        Raises:
-            GraphError: As in :meth:`Graph.subscribe`.
-
-        """
-        super().subscribe(owner, name, deliver, type_name, node=node)
-        self.subscribed.set()
-
-
 class Replay:
     """Publishes recorded messages as if they came now.
+
+    Its graph accepts no publishers or services once it is started: clients may
+    subscribe and ask questions, and no node would follow their commands.
 
     Args:
         recording: The recording.
@@ -97,12 +54,12 @@ class Replay:
 
     def __init__(self, recording: Recording, clock: Callable[[], float]) -> None:
         self.recording = recording
-        self.graph = ReplayGraph(recording.schema, clock=clock)
+        self.graph = Graph(recording.schema, clock=clock)
         self._stamps = Stamps(recording.schema)
         self._static: dict[str, AllFrames] = {}
 
     def start(self) -> None:
-        """Advertise all topics of the recording, and seal the graph."""
+        """Advertise all topics of the recording; the graph accepts no others then."""
         for topic in self.recording.topics.values():
             if topic.name in (STATUS, MARKS):
                 continue
@@ -113,7 +70,7 @@ class Replay:
             self.graph.advertise(self, name, TYPE, node=NODE, latch=True)
         self.forget()
         Rosapi(self.graph, POLITE).start()
-        self.graph.seal()
+        self.graph.refusal = REFUSED
 
     def forget(self) -> None:
         """Forget all latched messages: they may be from after the next position."""

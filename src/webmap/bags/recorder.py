@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from queue import SimpleQueue
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal
 
 from webmap.bags.recording import is_latched
 from webmap.bags.types import Types, TypeVersion
@@ -29,22 +29,7 @@ FOREVER = (9223372036, 854775807)
 """An infinite duration in ROS 2, in seconds and nanoseconds."""
 
 
-class BagFile(Protocol):
-    """A bag that is written message by message."""
-
-    path: Path
-
-    def add(self, topic: str, version: TypeVersion) -> Any:
-        """Add a topic, and return the channel for its messages."""
-
-    def write(self, channel: Any, time: int, data: bytes) -> None:
-        """Write a message, with its time of arrival in nanoseconds since 1970."""
-
-    def close(self) -> None:
-        """Complete and close the file, so that other programs can open it."""
-
-
-def new_bag(path: Path, dialect: DialectName) -> BagFile:
+def new_bag(path: Path, dialect: DialectName) -> "BagFile":
     """Create a bag; nothing that exists is overwritten.
 
     Args:
@@ -69,71 +54,41 @@ def new_bag(path: Path, dialect: DialectName) -> BagFile:
     from rosbags.rosbag2 import WriterError as Ros2Error
 
     try:
-        return Ros1Bag(path) if dialect == "ros1" else Ros2Bag(path)
+        return BagFile(path, dialect)
     except (Ros1Error, Ros2Error) as error:
         raise ConfigError(f"{path} cannot be created: {error}") from None
 
 
-class Ros1Bag:
-    """A bag of ROS 1: one file, which is complete only when it is closed."""
+class BagFile:
+    """A bag that is written message by message.
 
-    def __init__(self, path: Path) -> None:
-        from rosbags.rosbag1 import Writer
+    A bag of ROS 1 is one file, which is complete only when it is closed. One of ROS 2
+    is a folder with an MCAP file and its description. MCAP holds the definitions of the
+    types, and most of an unclosed file can be recovered: all but the last chunk, which
+    is a megabyte before its compression. rosbags writes sqlite3 as one transaction, of
+    which nothing would remain.
 
-        self.path = path
-        self._writer = Writer(path)
-        self._writer.open()
+    Args:
+        path: The file or the folder.
+        dialect: ROS 1 or ROS 2.
 
-    def add(self, topic: str, version: TypeVersion) -> Any:
-        """Add a topic, and return the channel for its messages."""
-        return self._writer.add_connection(
-            topic,
-            version.type_name,
-            typestore=version.store,
-            callerid="/webmap",
-            latching=int(is_latched(topic, canonical(version.type_name))),
-        )
-
-    def write(self, channel: Any, time: int, data: bytes) -> None:
-        """Write a message, with its time of arrival in nanoseconds since 1970."""
-        self._writer.write(channel, time, data)
-
-    def close(self) -> None:
-        """Complete and close the file, so that other programs can open it."""
-        self._writer.close()
-
-
-class Ros2Bag:
-    """A folder with an MCAP file and its description.
-
-    MCAP holds the definitions of the types, and most of an unclosed file can be
-    recovered: all but the last chunk, which is a megabyte before its compression.
-    rosbags writes sqlite3 as one transaction, of which nothing would remain.
     """
 
-    def __init__(self, path: Path) -> None:
-        from rosbags.rosbag2 import (
-            CompressionFormat,
-            CompressionMode,
-            StoragePlugin,
-            Writer,
-        )
-
+    def __init__(self, path: Path, dialect: DialectName) -> None:
         self.path = path
-        self._writer = Writer(
-            path, version=METADATA_VERSION, storage_plugin=StoragePlugin.MCAP
-        )
-        self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+        self._writer = _writer(path, dialect)
+        self._ros2 = dialect == "ros2"
         self._writer.open()
 
     def add(self, topic: str, version: TypeVersion) -> Any:
         """Add a topic, and return the channel for its messages."""
         latched = is_latched(topic, canonical(version.type_name))
+        if self._ros2:
+            details: dict[str, Any] = {"offered_qos_profiles": [_kept()] * latched}
+        else:
+            details = {"callerid": "/webmap", "latching": int(latched)}
         return self._writer.add_connection(
-            topic,
-            version.type_name,
-            typestore=version.store,
-            offered_qos_profiles=[_kept()] if latched else [],
+            topic, version.type_name, typestore=version.store, **details
         )
 
     def write(self, channel: Any, time: int, data: bytes) -> None:
@@ -143,6 +98,20 @@ class Ros2Bag:
     def close(self) -> None:
         """Complete and close the file, so that other programs can open it."""
         self._writer.close()
+
+
+def _writer(path: Path, dialect: DialectName) -> Any:
+    if dialect == "ros1":
+        from rosbags.rosbag1 import Writer
+
+        return Writer(path)
+    from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
+    from rosbags.rosbag2 import Writer as Ros2Writer
+
+    mcap = StoragePlugin.MCAP
+    writer = Ros2Writer(path, version=METADATA_VERSION, storage_plugin=mcap)
+    writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
+    return writer
 
 
 def _kept() -> "Qos":

@@ -18,11 +18,13 @@ from webmap.bags.files import (
     why_unreadable,
 )
 from webmap.bags.times import SECOND
-from webmap.bags.types import MessageConverter, bytes_of_json, texts_of
+from webmap.bags.types import bytes_of_json, texts_of
 from webmap.base.errors import ConfigError
 from webmap.ros.definitions import Definitions, UnknownType
 from webmap.ros.rosbridge.server.dialect import Dialect, canonical, resolve
 from webmap.ros.rosbridge.server.schema import Schema
+from webmap.ros.serialized.reader import Reader, make_reader
+from webmap.ros.serialized.schemas import Schema as MessageSchema
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection
@@ -135,6 +137,7 @@ class Recording:
         """The name, as shown to people."""
         self._warn = warn
         self._failed: set[str] = set()
+        self._readers: dict[str, Reader] = {}
         self._closed = False
         self._reader, self.dialect = opened(paths, dialect_of(paths))
         try:
@@ -156,7 +159,6 @@ class Recording:
         except Exception as error:
             self.close()
             raise unreadable(self.paths, error) from None
-        self._messages = MessageConverter(self.schema)
 
     @property
     def seconds(self) -> float:
@@ -277,8 +279,8 @@ class Recording:
             if is_json(recorded.connection):
                 fields = self.schema.fields(type_name)
                 data = bytes_of_json(fields, data, ros2=self.dialect == "ros2")
-            value = self._reader.deserialize(data, recorded.connection.msgtype)
-            return self._messages.message(type_name, value)
+            message: dict[str, Any] = self._reads(type_name)(data)
+            return message
         except Exception as error:
             if recorded.topic not in self._failed:
                 self._failed.add(recorded.topic)
@@ -288,6 +290,15 @@ class Recording:
                     f"({reason(error)})"
                 )
             return None
+
+    def _reads(self, type_name: str) -> Reader:
+        """Return the function that reads the messages of a type."""
+        if type_name not in self._readers:
+            ros2 = self.dialect == "ros2"
+            schema = MessageSchema(type_name, self.schema.fields(type_name), ros2)
+            reader = make_reader(schema, None, "cdr" if ros2 else "ros1")
+            self._readers[type_name] = reader
+        return self._readers[type_name]
 
     def _read(
         self, connections: "Sequence[Connection]", start: int | None, stop: int | None

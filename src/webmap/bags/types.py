@@ -1,11 +1,10 @@
-"""The message types of rosbags: writing of messages, and conversion of read ones."""
+"""The message types of rosbags, and the writing of messages."""
 
 import base64
 import binascii
-import keyword
 import math
 from array import array
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 import msgspec
@@ -17,7 +16,6 @@ from webmap.ros.definitions import (
     INTEGERS,
     OCTETS,
     SCALARS,
-    TIMES,
     Definitions,
     Field,
     UnknownType,
@@ -26,8 +24,8 @@ from webmap.ros.definitions import (
 from webmap.ros.message_check import MessageCheck, Misfit, check_size, wrong
 from webmap.ros.names import ros2_type
 from webmap.ros.rosbridge.server.dialect import DialectName, canonical
-from webmap.ros.rosbridge.server.schema import DTYPES, Schema
-from webmap.ros.serialized.schemas import Schema as MessageSchema
+from webmap.ros.rosbridge.server.schema import DTYPES
+from webmap.ros.serialized.schemas import Schema
 from webmap.ros.serialized.writer import serialize
 
 if TYPE_CHECKING:
@@ -119,7 +117,7 @@ class TypeVersion:
         whole = self._conformer.message(self._fields, message)
         return serialize(self._fields, whole, ros2=self._ros2)
 
-    def has(self, schema: MessageSchema) -> bool:
+    def has(self, schema: Schema) -> bool:
         """Return whether serialized messages of a schema are those of this release."""
         return schema.ros2 == self._ros2 and _same_bytes(schema.fields, self._fields)
 
@@ -280,84 +278,3 @@ def _octets(value: str | bytes) -> bytes:
         return base64.b64decode(value, validate=True)
     except binascii.Error as error:
         raise Misfit(f"no base64: {error}") from None
-
-
-Conversion = Callable[[Any], Any]
-
-
-class MessageConverter:
-    """Converts rosbags' objects to messages of the rosbridge server.
-
-    Arrays stay arrays, and bytes become bytes; times have the field names of the
-    schema's dialect.
-
-    Args:
-        schema: The types with their fields.
-
-    """
-
-    def __init__(self, schema: Schema) -> None:
-        self._schema = schema
-        self._known: dict[str, Conversion] = {}
-
-    def message(self, type_name: str, value: object) -> dict[str, Any]:
-        """Return the message of an object.
-
-        Args:
-            type_name: The type of the message, by its name in the schema.
-            value: The object that rosbags decoded.
-
-        Raises:
-            UnknownType: If the type is not in the schema.
-
-        """
-        make = self._known.get(type_name)
-        if make is None:
-            # Built once for each type, since messages come many times a second.
-            fields = self._schema.fields(type_name)
-            make = self._known[type_name] = self._record(fields)
-        made: dict[str, Any] = make(value)
-        return made
-
-    def _record(self, fields: Sequence[Field]) -> Conversion:
-        parts = [
-            (field.name, _attribute(field.name), self._field(field)) for field in fields
-        ]
-        return lambda value: {
-            name: make(getattr(value, inner)) for name, inner, make in parts
-        }
-
-    def _field(self, field: Field) -> Conversion:
-        if not field.is_array:
-            return self._single(field)
-        if field.type in OCTETS:
-            return bytes
-        numbers = field.type in DTYPES
-        if field.type == "bool" or (numbers and field.size is not None):
-            return _listed
-        if numbers:
-            return _same
-        single = self._single(field)
-        return lambda values: [single(value) for value in values]
-
-    def _single(self, field: Field) -> Conversion:
-        if field.fields is not None:
-            return self._record(field.fields)
-        if field.type in TIMES:
-            whole, rest = self._schema.dialect.time(0)
-            return lambda time: {whole: int(time.sec), rest: int(time.nanosec)}
-        return _same
-
-
-def _attribute(field: str) -> str:
-    """Return rosbags' name of a field: a keyword of Python gets an underscore."""
-    return f"{field}_" if keyword.iskeyword(field) else field
-
-
-def _same(value: Any) -> Any:
-    return value
-
-
-def _listed(values: Any) -> list[Any]:
-    listed: list[Any] = values.tolist()
-    return listed

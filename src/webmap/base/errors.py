@@ -28,8 +28,10 @@ class BridgeError(WebMapError):
 class BridgeClosed(BridgeError):
     """The connection to the ROS system is not open now, and nothing is queued."""
 
-    why = ""
-    """Why the attempt to open it failed, without the address, if known."""
+    def __init__(self, text: str, why: str = "") -> None:
+        super().__init__(text)
+        self.why = why
+        """Why the attempt to open it failed, without the address, if known."""
 
 
 class ProtocolError(BridgeError):

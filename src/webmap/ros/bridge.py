@@ -23,6 +23,7 @@ from webmap.ros.link import LinkType
 from webmap.ros.motion_topics import written_behind
 from webmap.ros.names import normalise_topic, normalise_url, same_type, split_type
 from webmap.ros.received_message import BridgeStats, LinkState, ReceivedMessage
+from webmap.ros.rosbridge.graph import is_client_node
 from webmap.ros.rosbridge.link import RosbridgeLink
 from webmap.ros.subscriptions import (
     Encoding,
@@ -350,7 +351,8 @@ class Bridge:
 
         WebMap itself is such a client. None as for :meth:`publishers`.
         """
-        return await self._graph.other_publishers(normalise_topic(topic))
+        nodes = await self.publishers(topic)
+        return nodes and [name for name in nodes if not is_client_node(name)]
 
     async def subscribers(self, topic: str) -> list[str] | None:
         """Return the nodes that subscribe to a topic; None if there is no answer."""

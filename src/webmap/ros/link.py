@@ -6,10 +6,11 @@ called in the model's thread.
 
 import asyncio
 import logging
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal, Protocol
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, Literal, Protocol, TypedDict, Unpack
 
-from webmap.base.errors import BridgeClosed
+from webmap.base.errors import BridgeClosed, BridgeError, ProtocolError
+from webmap.base.text import one_line
 from webmap.ros.definitions import Definitions
 from webmap.ros.received_message import BridgeStats, LinkState, ReceivedMessage
 from webmap.ros.sockets.connection import CLOSED_HERE
@@ -73,9 +74,6 @@ class _Graph(Protocol):
         self, kind: Literal["publishers", "subscribers"], topic: str
     ) -> list[str] | None:
         """Return the names of the nodes of a kind."""
-
-    async def other_publishers(self, topic: str) -> list[str] | None:
-        """Return the publishers without those that publish for WebMap."""
 
     async def definitions(self, type: str, kind: str) -> Definitions:
         """Return the definitions of a type: see :meth:`webmap.Bridge.definitions`."""
@@ -150,30 +148,36 @@ class _Link(Protocol):
         """Close every connection; keep the subscriptions for another start."""
 
 
+class LinkCallbacks(TypedDict):
+    """What a bridge lets its link call. They log nothing: the link does."""
+
+    opened: Callable[[], None]
+    """To call when the connection is open."""
+
+    closed: Callable[[str], None]
+    """To call when an open connection has ended, with a reason."""
+
+    received: Callable[[Topic, ReceivedMessage], bool]
+    """To call with each message of a subscribed topic. It returns whether the message
+    can be used; a link may ignore that."""
+
+    report: Callable[[Exception], None]
+    """To call with each error that a person may need to know, such as a failed attempt
+    to connect."""
+
+
 class LinkType(Protocol):
     """The class of a kind of link; it need not derive from any other class."""
 
     def __call__(
-        self,
-        url: str,
-        name: str,
-        *,
-        opened: Callable[[], None],
-        closed: Callable[[str], None],
-        received: Callable[[Topic, ReceivedMessage], bool],
-        report: Callable[[Exception], None],
+        self, url: str, name: str, **callbacks: Unpack[LinkCallbacks]
     ) -> _Link:
         """Make the link of one bridge, which opens no connection yet.
 
         Args:
             url: The normalised address: without the port if that is the default one.
             name: The bridge's name, as shown to people.
-            opened: To call when the connection is open.
-            closed: To call when an open connection has ended, with a reason.
-            received: To call with each message of a subscribed topic. It returns
-                whether the message can be used; a link may ignore that.
-            report: To call with each error that a person may need to know, such as a
-                failed attempt to connect. It logs nothing: the link does.
+            callbacks: What the link calls.
 
         """
 
@@ -195,30 +199,23 @@ class ReconnectingLink:
 
     Args:
         name: The bridge's name, as shown to people.
-        opened: Called when the connection is open.
-        closed: Called with the reason when an open connection has ended.
-        report: Called with each error that a person may need to know.
+        callbacks: Those of the bridge.
 
     """
 
     _calls: _Calls
 
-    def __init__(
-        self,
-        name: str,
-        opened: Callable[[], None],
-        closed: Callable[[str], None],
-        report: Callable[[Exception], None],
-    ) -> None:
+    def __init__(self, name: str, **callbacks: Unpack[LinkCallbacks]) -> None:
         self.stats = BridgeStats()
         self.trouble: str | None = None
         """Why the connection is not open: the last failed attempt or the last loss."""
         self.over: str | None = None
         """Why no connection is opened any more; None if connections are allowed."""
         self._name = name
-        self._on_open = opened
-        self._on_close = closed
-        self._report = report
+        self._on_open = callbacks["opened"]
+        self._on_close = callbacks["closed"]
+        self._on_message = callbacks["received"]
+        self._report = callbacks["report"]
         self._complained = False
         """Whether the failure of the connection has been logged."""
 
@@ -263,3 +260,43 @@ class ReconnectingLink:
         self.trouble = error.why
         log.log(level, "%s", error, extra={"source": self._name})
         self._report(error)
+
+
+def report_error(
+    name: str, message: object, report: Callable[[Exception], None]
+) -> None:
+    """Report an error that a bridge itself reports.
+
+    Args:
+        name: The bridge's name, as shown to people.
+        message: What the bridge reports.
+        report: Called with the error.
+
+    """
+    text = f"{name}: the bridge reports an error: {one_line(message)}"
+    log.warning("%s", text)
+    report(BridgeError(text))
+
+
+def report_malformed(
+    name: str,
+    found: str,
+    topics: Iterable[Topic],
+    report: Callable[[Exception], None],
+) -> None:
+    """Report a frame that is not in the protocol of a bridge, also to one subscriber.
+
+    Args:
+        name: The bridge's name, as shown to people.
+        found: What it sent, as the end of a sentence.
+        topics: The topics with the subscribers.
+        report: Called with the error.
+
+    """
+    error = ProtocolError(f"{name} sent {found}")
+    log.warning("%s", error, extra={"source": name})
+    report(error)
+    for topic in topics:
+        for listener in topic.listeners:
+            if listener.mention(error):
+                return

@@ -121,20 +121,18 @@ class MessageCheck:
 
     def number(self, field: Field, value: Any) -> float:
         """Return a finite number that the type of the field can hold."""
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise wrong(value, "a number")
-        if not abs(value) <= FLOATS[field.type]:  # NaN or infinite
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not is_number or not abs(value) <= FLOATS[field.type]:  # NaN or infinite
             raise wrong(value, "a number")
         return float(value)
 
     def whole(self, field: Field, value: Any) -> int:
         """Return an integer that the type of the field can hold."""
         low, high = INTEGERS[field.type]
-        if isinstance(value, bool) or not isinstance(value, int):
+        is_whole = isinstance(value, int) and not isinstance(value, bool)
+        if not is_whole or not low <= value <= high:
             raise wrong(value, expectation(replace(field, is_array=False)))
-        if not low <= value <= high:
-            raise wrong(value, expectation(replace(field, is_array=False)))
-        return value
+        return int(value)
 
     def truth(self, value: Any) -> bool:
         """Return a boolean; 0 and 1 are refused."""

@@ -164,16 +164,15 @@ async def tried(seen: BridgeFacts) -> BridgeFacts:
     """Return the observations, with a test of what a slow service call delays."""
     if is_agent_url(seen.url):
         why = "an agent lets a display offer no service"
-        return replace(seen, link=checks.not_tried(seen.link, why))
-    if is_foxglove_url(seen.url):
+    elif is_foxglove_url(seen.url):
         why = "clients of a Foxglove bridge can offer no service"
-        return replace(seen, link=checks.not_tried(seen.link, why))
-    if not is_rosbridge_url(seen.url):
+    elif not is_rosbridge_url(seen.url):
         why = "it is a test of a rosbridge"
-        return replace(seen, link=checks.not_tried(seen.link, why))
-    if seen.unlisted:
+    elif seen.unlisted:
         return replace(seen, link=checks.not_tried(seen.link))
-    return replace(seen, link=await checks.tried_a_call(seen.link, seen.url))
+    else:
+        return replace(seen, link=await checks.tried_a_call(seen.link, seen.url))
+    return replace(seen, link=checks.not_tried(seen.link, why))
 
 
 def _with_configured(

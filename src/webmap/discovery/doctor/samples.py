@@ -77,13 +77,10 @@ class TopicSamples:
 
     def end(self, now: float) -> dict[str, Measurement]:
         """Return what was measured of each topic; ``now`` is monotonic seconds."""
-        return {topic: self._sum_up(topic, now) for topic in self._measured}
+        return {topic: self.end_of(topic, now) for topic in self._measured}
 
     def end_of(self, topic: str, now: float) -> Measurement:
         """Return what was measured of one topic, as :meth:`end` does."""
-        return self._sum_up(topic, now)
-
-    def _sum_up(self, topic: str, now: float) -> Measurement:
         measured, seconds = self._measured[topic], now - self._began
         gap = max(self._gap[topic], now - self._last[topic])
         if topic not in self._newest:
@@ -96,11 +93,10 @@ class TopicSamples:
             stamp = stamped.header.stamp.seconds or None
         except ProtocolError as error:
             trouble = str(error)
-        return Measurement(
-            count=measured.count,
+        return replace(
+            measured,
             seconds=seconds,
             longest_gap=gap,
-            bytes=measured.bytes,
             frame=frame,
             child=child,
             stamp=stamp,

@@ -245,9 +245,4 @@ def _agent(seen: BridgeFacts) -> Iterator[Finding]:
             "Start the router with TLS and users, and use zenohs:// in the address.",
         )
     if seen.link.no_result:
-        yield Finding(
-            "note",
-            BRIDGE,
-            f"The test of a slow service call gave no result: {seen.link.no_result}.",
-            ON_THE_ROBOT,
-        )
+        yield advice.no_result(seen.link, ON_THE_ROBOT)

@@ -293,38 +293,21 @@ class Camera(TopicCamera):
         self._waiting = None
 
     def on_picture(self, image: CompressedImageMsg | ImageMsg | AnyImageMsg) -> None:
-        """Show a picture of either type.
+        """Show a picture; while a raw one is converted, only the newest waits.
 
         Raises:
             ProtocolError: If the picture cannot be shown.
         """
         if isinstance(image, AnyImageMsg):
             image = image.raw or image.packed
-        if isinstance(image, ImageMsg):
-            self.on_image(image)
-        else:
-            self.on_compressed(image)
-
-    def on_compressed(self, image: CompressedImageMsg) -> None:
-        """Show a compressed picture unchanged.
-
-        Raises:
-            ProtocolError: If browsers cannot show it.
-        """
-        self.show(image.data, image.media_type, self._bridge.lag)
-
-    def on_image(self, image: ImageMsg) -> None:
-        """Show a raw picture; while one is being converted, only the newest waits.
-
-        Raises:
-            ProtocolError: If its encoding or its size is not supported.
-        """
-        if image.encoding == JPEG:
+        if not isinstance(image, ImageMsg):
+            self.show(image.data, image.media_type, self._bridge.lag)
+        elif image.encoding == JPEG:
             self.show(image.data, "image/jpeg", self._bridge.lag)
-            return
-        self._waiting = image
-        if self._drawing is None:
-            self._drawing = spawn(self._draw())
+        else:
+            self._waiting = image
+            if self._drawing is None:
+                self._drawing = spawn(self._draw())
 
     async def _draw(self) -> None:
         try:

@@ -14,7 +14,7 @@ import {
 import { CardVideos } from "./video_picture.js";
 import { resolve } from "../../web/access.js";
 import { devicesOf } from "../../web/inputs/devices.js";
-import { closeSheet } from "../../web/tools/elements.js";
+import { closeSheet, setAttribute } from "../../web/tools/elements.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('./camera_view.js').Dock} Dock */
@@ -360,9 +360,7 @@ class CameraPanel {
     const shown = this._view.cells.map(({ target }) => target.camera?.id);
     for (const button of document.querySelectorAll("button[data-camera-id]")) {
       const large = shown.includes(Number(button.getAttribute("data-camera-id")));
-      if (button.getAttribute("aria-pressed") !== String(large)) {
-        button.setAttribute("aria-pressed", String(large));
-      }
+      setAttribute(button, "aria-pressed", String(large));
     }
     this._cards.look();
     const seen = document.visibilityState === "visible";

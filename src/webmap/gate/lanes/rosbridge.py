@@ -141,24 +141,9 @@ def cancel_message(topic: str) -> Message:
     return topic, GOAL_ID, {}
 
 
-def cancel_by_service(action: str, id: str) -> bytes:
-    """Return the operation that cancels every goal of a ROS 2 action."""
-    return ops.call_service(
-        f"{action}/_action/cancel_goal",
-        {"goal_info": {}},
-        id=id,
-        type="action_msgs/srv/CancelGoal",
-    )
-
-
 def flag(topic: str, type: str, value: bool) -> Message:
     """Return the message with a Bool."""
     return topic, type, {"data": value}
-
-
-def trigger(service: str, type: str, id: str) -> bytes:
-    """Return the operation that calls a service of type Trigger."""
-    return ops.call_service(service, {}, id=id, type=type)
 
 
 def pose_estimate(spec: RobotSpec, at: SendPose) -> Message:

@@ -172,13 +172,12 @@ class RosbridgeWire:
 
     def trigger_call(self, service: str, type: str) -> Call:
         """Return the call of a service of type Trigger."""
-        id = generate_id()
-        return RosbridgeCall(rosbridge.trigger(service, type, id), id)
+        return _call(service, {}, type)
 
     def cancel_call(self, action: str) -> Call:
         """Return the call that cancels every goal of a ROS 2 action."""
-        id = generate_id()
-        return RosbridgeCall(rosbridge.cancel_by_service(action, id), id)
+        service, type = f"{action}/_action/cancel_goal", "action_msgs/srv/CancelGoal"
+        return _call(service, {"goal_info": {}}, type)
 
     def action_goal(self, spec: RobotSpec, goal: SendGoal) -> ActionGoal:
         """Return a goal for the robot's action of ROS 2."""
@@ -204,6 +203,11 @@ class RosbridgeWire:
     def read_scan(self, data: bytes, now: float) -> tuple[str, Scan] | None:
         """Return the topic and the scan in a frame."""
         return scans.parse_scan(data, now)
+
+
+def _call(service: str, args: Mapping[str, Any], type: str) -> RosbridgeCall:
+    id = generate_id()
+    return RosbridgeCall(ops.call_service(service, args, id=id, type=type), id)
 
 
 def wire_to(

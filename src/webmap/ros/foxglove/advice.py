@@ -1,12 +1,15 @@
 """The part of ``webmap doctor`` that holds for a Foxglove bridge alone."""
 
 from collections.abc import Iterator
-from urllib.parse import urlsplit
 
-from webmap.ros.rosbridge.advice import BRIDGE, Finding
-from webmap.ros.rosbridge.checks import LinkFacts, is_loopback
-
-_LISTEN = "Configure it to listen on {} (address), or close its port in the firewall."
+from webmap.ros.rosbridge.advice import (
+    BRIDGE,
+    Finding,
+    listen_advice,
+    no_result,
+    openness_of,
+)
+from webmap.ros.rosbridge.checks import LinkFacts
 
 
 def unreachable(trouble: str) -> Finding:
@@ -39,56 +42,22 @@ def findings(facts: LinkFacts, url: str) -> Iterator[Finding]:
         url: Its address.
 
     """
-    yield _openness(facts, url)
+    yield openness_of(
+        "Foxglove bridge",
+        facts,
+        url,
+        "",
+        listen_advice("ros2", "this machine alone (address)"),
+        f"{listen_advice('ros2', 'the robot alone or on a VPN (address)')} Offer only "
+        "the topics that clients need (topic_whitelist, client_topic_whitelist), and "
+        "use TLS.",
+    )
     if facts.no_result:
-        yield Finding(
-            "note",
-            BRIDGE,
-            f"The test of a slow service call gave no result: {facts.no_result}.",
-        )
+        yield no_result(facts)
     yield Finding(
         "note",
         BRIDGE,
         "A service that hangs may delay everything for all clients of the bridge, the "
         "velocity too.",
         "Offer only the services that people need (service_whitelist).",
-    )
-
-
-def _openness(facts: LinkFacts, url: str) -> Finding:
-    parts = urlsplit(url)
-    here = is_loopback(facts.peer or parts.hostname or "")
-    outward = [each for each in facts.listens if not is_loopback(each)]
-    if here and facts.listens and not outward:
-        text = "The Foxglove bridge listens on this machine alone."
-        return Finding("good", BRIDGE, text)
-    if here and outward:
-        return Finding(
-            "warning",
-            BRIDGE,
-            f"The Foxglove bridge is on this machine and listens at "
-            f"{', '.join(outward)}: it has no sign-in, so everybody who reaches this "
-            "machine can drive.",
-            _LISTEN.format("this machine alone"),
-        )
-    if here:
-        return Finding(
-            "note",
-            BRIDGE,
-            "The Foxglove bridge was reached at an address of this machine; WebMap "
-            "cannot see whether other machines reach it too.",
-        )
-    encrypted = parts.scheme == "foxgloves"
-    secret = (
-        "the connection is encrypted"
-        if encrypted
-        else "everybody on the network can read and change the messages"
-    )
-    return Finding(
-        "note" if encrypted else "warning",
-        BRIDGE,
-        f"The Foxglove bridge is open to the network ({facts.peer or parts.hostname}): "
-        f"it has no sign-in, so everybody who reaches it can drive; {secret}.",
-        f"{_LISTEN.format('the robot alone or on a VPN')} Offer only the topics that "
-        "clients need (topic_whitelist, client_topic_whitelist), and use TLS.",
     )

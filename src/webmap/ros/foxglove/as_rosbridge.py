@@ -6,25 +6,17 @@ robot of an agent may have a Foxglove bridge.
 """
 
 import asyncio
-import sys
-from array import array
-from collections.abc import Callable, Coroutine
+from collections.abc import Coroutine
 from typing import Any
 
-import cbor2
 import msgspec
 
 from webmap.base.errors import BridgeClosed, ServiceError, WebMapError
 from webmap.base.scope import no_scope
+from webmap.ros.rosbridge.server.encode import to_cbor, to_json
 from webmap.ros.sockets.connection import CLOSED_HERE, BridgeConnection
 from webmap.ros.subscriptions import Subscription
 from webmap.ros.temporary_bridge import TemporaryBridge
-
-# RFC 8746: little-endian arrays of each kind of number, by the code of the array.
-_TAGS = {
-    **{"B": 64, "H": 69, "I": 70, "Q": 71, "b": 72, "h": 77, "i": 78, "q": 79},
-    **{"f": 85, "d": 86},
-}
 
 
 class _Operation(msgspec.Struct):
@@ -119,7 +111,7 @@ class RosbridgeOfFoxglove(BridgeConnection):
 
         def deliver(message: dict[str, Any]) -> None:
             fields = {"op": "publish", "topic": asked.topic, "msg": message}
-            self._deliver(_cbor(fields) if as_cbor else _json(fields))
+            self._deliver(to_cbor(fields) if as_cbor else to_json(fields))
 
         before = self._subscribed.pop((asked.topic, asked.id), None)
         with no_scope():
@@ -179,21 +171,21 @@ class RosbridgeOfFoxglove(BridgeConnection):
         if self.state != "open":
             return
         self._end_subscriptions()
-        self.state = "connecting" if self._again else "closed"
+        self._end_unless_again()
         self._closed(reason)
-        if not self._again:
-            self._spawn(self._bridge.stop())
 
     def _bridge_failed(self, error: Exception) -> None:
         if self.state == "open":
             self._give({"op": "status", "level": "error", "msg": str(error)})
             return
-        if not isinstance(error, BridgeClosed):
-            return
+        if isinstance(error, BridgeClosed):
+            self._end_unless_again()
+            self._failed(error)
+
+    def _end_unless_again(self) -> None:
+        self.state = "connecting" if self._again else "closed"
         if not self._again:
-            self.state = "closed"
             self._spawn(self._bridge.stop())
-        self._failed(error)
 
     def _end_subscriptions(self) -> None:
         for subscription in self._subscribed.values():
@@ -206,31 +198,8 @@ class RosbridgeOfFoxglove(BridgeConnection):
         task.add_done_callback(self._tasks.discard)
 
     def _give(self, operation: dict[str, Any]) -> None:
-        self._deliver(_json(operation))
+        self._deliver(to_json(operation))
 
     def _deliver(self, frame: bytes | bytearray) -> None:
         if self.state == "open":
             self._received(frame)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, array):
-        return value.tolist()
-    raise TypeError(f"a message cannot hold a {type(value).__name__}")
-
-
-_json: Callable[[dict[str, Any]], bytes] = msgspec.json.Encoder(enc_hook=_plain).encode
-"""Returns an operation in JSON: bytes in base64, and null for NaN and infinities."""
-
-
-def _tag_array(encoder: cbor2.CBOREncoder, value: Any) -> None:
-    if not isinstance(value, array):
-        raise TypeError(f"a message cannot hold a {type(value).__name__}")
-    if sys.byteorder == "big":
-        value = array(value.typecode, value)
-        value.byteswap()
-    encoder.encode(cbor2.CBORTag(_TAGS[value.typecode], value.tobytes()))
-
-
-def _cbor(operation: dict[str, Any]) -> bytes:
-    return cbor2.dumps(operation, default=_tag_array)

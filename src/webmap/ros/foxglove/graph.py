@@ -17,7 +17,6 @@ from webmap.ros.foxglove.messages import (
 from webmap.ros.foxglove.protocol import Parameter
 from webmap.ros.foxglove.session import Session
 from webmap.ros.names import same_type
-from webmap.ros.rosbridge.graph import is_client_node
 
 FIRST = 2.0
 """Longest wait for the first channels of a server, in seconds."""
@@ -82,11 +81,6 @@ class FoxgloveGraph:
             self._main.publishers if kind == "publishers" else self._main.subscribers
         )
         return nodes.get(topic)
-
-    async def other_publishers(self, topic: str) -> list[str] | None:
-        """Return the publishers of ``topic``, without those for clients of a bridge."""
-        nodes = await self.nodes("publishers", topic)
-        return nodes and [name for name in nodes if not is_client_node(name)]
 
     async def definitions(self, type: str, kind: str) -> Definitions:
         """Return the definitions of a type and of all its parts, and the included ones.

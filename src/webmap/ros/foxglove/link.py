@@ -8,9 +8,9 @@ them. The last two are opened when they are needed.
 import asyncio
 import itertools
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Unpack
 
 from msgspec.structs import replace
 
@@ -22,9 +22,8 @@ from webmap.ros.foxglove.graph import FoxgloveGraph
 from webmap.ros.foxglove.messages import Format, format_of, included_text, own_channel
 from webmap.ros.foxglove.session import Session
 from webmap.ros.limits import LIMITS
-from webmap.ros.link import PATIENCE, ReconnectingLink
+from webmap.ros.link import PATIENCE, LinkCallbacks, ReconnectingLink
 from webmap.ros.names import VIDEO, is_type
-from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.sockets.connection import BridgeConnection
 from webmap.ros.subscriptions import Topic
 
@@ -54,25 +53,12 @@ class FoxgloveLink(ReconnectingLink):
     Args:
         url: The bridge's address.
         name: The bridge's name, as shown to people.
-        opened: Called when the connection is open.
-        closed: Called with the reason when an open connection has ended.
-        received: Called with each message of a subscribed topic; returns whether the
-            message can be used.
-        report: Called with each error that a person may need to know.
+        callbacks: Those of the bridge.
 
     """
 
-    def __init__(
-        self,
-        url: str,
-        name: str,
-        *,
-        opened: Callable[[], None],
-        closed: Callable[[str], None],
-        received: Callable[[Topic, ReceivedMessage], bool],
-        report: Callable[[Exception], None],
-    ) -> None:
-        super().__init__(name, opened, closed, report)
+    def __init__(self, url: str, name: str, **callbacks: Unpack[LinkCallbacks]) -> None:
+        super().__init__(name, **callbacks)
         self._timer: asyncio.TimerHandle | None = None
         """When the server must have introduced itself."""
         self._published: dict[str, _Published] = {}
@@ -85,8 +71,8 @@ class FoxgloveLink(ReconnectingLink):
             informed=self._informed,
             closed=self._lost,
             failed=self._not_opened,
-            received=received,
-            report=report,
+            received=self._on_message,
+            report=self._report,
             carries=lambda type: not _is_large(type),
             elsewhere=self._open_large,
         )
@@ -96,8 +82,8 @@ class FoxgloveLink(ReconnectingLink):
             self.stats,
             opened=self._large_opened,
             closed=lambda _reason: self._large_lost(),
-            received=received,
-            report=report,
+            received=self._on_message,
+            report=self._report,
             carries=_is_large,
         )
         self._calls = Calls(url, name, self.stats)

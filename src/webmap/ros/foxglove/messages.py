@@ -9,14 +9,19 @@ import msgspec
 
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.ros.decoding import check_depth, decode_json
-from webmap.ros.definitions import Definitions, shipped, split_texts
+from webmap.ros.definitions import Definitions, shipped
 from webmap.ros.foxglove.protocol import PAYLOAD, Channel, MessageSchema
 from webmap.ros.names import is_topic, ros2_type, split_type
 from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.rosbridge.events import check_count
-from webmap.ros.serialized.idl import messages_of
 from webmap.ros.serialized.reader import make_reader
-from webmap.ros.serialized.schemas import Encoding, Schema, SchemaEncoding, read_schema
+from webmap.ros.serialized.schemas import (
+    Encoding,
+    Schema,
+    SchemaEncoding,
+    read_schema,
+    texts_in,
+)
 from webmap.ros.serialized.writer import make_writer
 
 _SCHEMAS: dict[str, SchemaEncoding] = {"cdr": "ros2msg", "ros1": "ros1msg"}
@@ -88,14 +93,9 @@ class Format:
     @property
     def definitions(self) -> Definitions:
         """The definitions of the type and of its parts; ConfigError if not readable."""
-        name, ros2 = str(split_type(self.type)), self._schema_encoding != "ros1msg"
-        text = self._text or ""
-        if self._schema_encoding == "ros2idl":
-            texts = messages_of(text)
-        else:
-            texts = split_texts(text, name, ros2=ros2)
-        plain = {str(split_type(each)): found for each, found in texts.items()}
-        return Definitions(plain, ros2=ros2)
+        language, name = self._schema_encoding or "", str(split_type(self.type))
+        texts = texts_in(self._text or "", language, name)
+        return Definitions(texts, ros2=language != "ros1msg")
 
     def _make_reader(
         self, wanted: type[msgspec.Struct] | None

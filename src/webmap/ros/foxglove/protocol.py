@@ -72,14 +72,26 @@ class MessageSchema(Struct, frozen=True, rename="camel"):
     schema_encoding: str | None = None
 
 
-class Service(Struct, frozen=True):
+class Service(Struct, rename="camel"):
     """A service that the server offers; None where it gave no schema."""
 
-    id: int
+    id: Id32
     name: str
-    type: str
+    type: str = ""
     request: MessageSchema | None = None
     response: MessageSchema | None = None
+    request_schema: str | None = None
+    """Of older servers, which is moved to ``request``."""
+    response_schema: str | None = None
+
+    def __post_init__(self) -> None:
+        """Bring the descriptions of older servers into the form of newer ones."""
+        asked, answered = self.request_schema, self.response_schema
+        self.request_schema = self.response_schema = None
+        if self.request is None and asked is not None:
+            self.request = MessageSchema(f"{self.type}_Request", asked)
+        if self.response is None and answered is not None:
+            self.response = MessageSchema(f"{self.type}_Response", answered)
 
 
 class ServerInfo(Struct, frozen=True, rename="camel"):
@@ -146,25 +158,19 @@ class ParameterValues(Struct, frozen=True):
     """That of the request."""
 
 
-class Published(Struct, frozen=True, rename="camel"):
-    """The nodes that publish a topic, in place of those known before."""
+class TopicNodes(Struct, frozen=True, rename="camel"):
+    """The nodes that publish or subscribe to a topic, in place of those before."""
 
     name: str
     publisher_ids: list[str] = []
-
-
-class Subscribed(Struct, frozen=True, rename="camel"):
-    """The nodes that subscribe to a topic, in place of those known before."""
-
-    name: str
     subscriber_ids: list[str] = []
 
 
 class ConnectionGraphUpdate(Struct, frozen=True, rename="camel"):
     """The changes of the graph of nodes that WebMap uses."""
 
-    published_topics: list[Published] = []
-    subscribed_topics: list[Subscribed] = []
+    published_topics: list[TopicNodes] = []
+    subscribed_topics: list[TopicNodes] = []
     removed_topics: list[str] = []
 
 
@@ -243,16 +249,6 @@ class _Services(Struct):
     services: list[msgspec.Raw]
 
 
-class _Service(Struct, rename="camel"):
-    id: Id32
-    name: str
-    type: str = ""
-    request: MessageSchema | None = None
-    response: MessageSchema | None = None
-    request_schema: str | None = None
-    response_schema: str | None = None
-
-
 _PLAIN: dict[str, type[Any]] = {
     "serverInfo": ServerInfo,
     "status": Status,
@@ -301,12 +297,11 @@ def _read_text(text: bytes | bytearray) -> Event:
         )
     op = msgspec.json.decode(text, type=_Op).op
     if op == "advertise":
-        channels, faults = _each(msgspec.json.decode(text, type=_Channels).channels)
-        return Advertise(channels, faults)
+        found = msgspec.json.decode(text, type=_Channels).channels
+        return Advertise(*_each(found, Channel))
     if op == "advertiseServices":
         found = msgspec.json.decode(text, type=_Services).services
-        services, faults = _each(found, _Service)
-        return AdvertiseServices([_in_one_form(each) for each in services], faults)
+        return AdvertiseServices(*_each(found, Service))
     if op not in _PLAIN:
         return Unknown(op[:64])
     event: Event = msgspec.json.decode(text, type=_PLAIN[op])
@@ -317,9 +312,7 @@ def _read_text(text: bytes | bytearray) -> Event:
     return event
 
 
-def _each(
-    parts: list[msgspec.Raw], type: type[Any] = Channel
-) -> tuple[list[Any], list[str]]:
+def _each(parts: list[msgspec.Raw], type: type[T]) -> tuple[list[T], list[str]]:
     """Return the parts of a list that can be read, and why the others cannot."""
     good, faults = [], []
     for part in parts:
@@ -328,15 +321,6 @@ def _each(
         except (msgspec.MsgspecError, ValueError, RecursionError) as error:
             faults.append(f"{error}: {bytes(memoryview(part)[:80])!r}")
     return good, faults
-
-
-def _in_one_form(service: _Service) -> Service:
-    request, response = service.request, service.response
-    if request is None and service.request_schema is not None:
-        request = MessageSchema(f"{service.type}_Request", service.request_schema)
-    if response is None and service.response_schema is not None:
-        response = MessageSchema(f"{service.type}_Response", service.response_schema)
-    return Service(service.id, service.name, service.type, request, response)
 
 
 def _read_response(frame: bytes | bytearray) -> ServiceCallResponse:

@@ -17,25 +17,7 @@ from webmap.ros.foxglove.messages import (
     format_of_channel,
     is_readable,
 )
-from webmap.ros.foxglove.protocol import (
-    Advertise,
-    AdvertiseServices,
-    Channel,
-    ConnectionGraphUpdate,
-    Event,
-    Malformed,
-    MessageData,
-    ParameterValues,
-    ServerInfo,
-    Service,
-    ServiceCallFailure,
-    ServiceCallResponse,
-    Status,
-    Time,
-    Unadvertise,
-    UnadvertiseServices,
-    Unknown,
-)
+from webmap.ros.link import report_error, report_malformed
 from webmap.ros.names import normalise_topic, same_type, web_socket_url
 from webmap.ros.received_message import BridgeStats, ReceivedMessage
 from webmap.ros.sockets.connection import BridgeConnection
@@ -58,7 +40,7 @@ T = TypeVar("T")
 
 class _Subscribed(NamedTuple):
     topic: Topic
-    channel: Channel
+    channel: protocol.Channel
     message: Callable[[str, bytes | bytearray], ReceivedMessage]
     """Makes a message of its topic and its frame."""
 
@@ -98,8 +80,8 @@ class Session:
         elsewhere: Callable[[], None] = lambda: None,
         again: bool = True,
     ) -> None:
-        self.info: ServerInfo | None = None
-        self.services: dict[str, Service] = {}
+        self.info: protocol.ServerInfo | None = None
+        self.services: dict[str, protocol.Service] = {}
         self.publishers: dict[str, list[str]] = {}
         self.subscribers: dict[str, list[str]] = {}
         self.failure: BridgeClosed | None = None
@@ -138,13 +120,13 @@ class Session:
         self.services = {}
         self.publishers, self.subscribers = {}, {}
         self.time = None
-        self._channels: dict[int, Channel] = {}
-        self._by_topic: dict[str, dict[int, Channel]] = {}
+        self._channels: dict[int, protocol.Channel] = {}
+        self._by_topic: dict[str, dict[int, protocol.Channel]] = {}
         self._subscribed: dict[int, _Subscribed] = {}
         """What the ids of subscriptions mean."""
         self._id_of: dict[str, int] = {}
-        self._calls: dict[int, asyncio.Future[bytes]] = {}
-        self._questions: dict[str, asyncio.Future[ParameterValues]] = {}
+        self._questions: dict[int | str, asyncio.Future[Any]] = {}
+        """What waits for the answers to calls and questions, by their ids."""
         self._server_time = False
         self._statuses: set[str] = set()
         self._complained = False
@@ -155,7 +137,7 @@ class Session:
 
     # What the server offers.
 
-    def channels_of(self, topic: str) -> Iterable[Channel]:
+    def channels_of(self, topic: str) -> Iterable[protocol.Channel]:
         """Return the readable channels of a topic."""
         return self._by_topic.get(topic, {}).values()
 
@@ -166,7 +148,7 @@ class Session:
             for topic, channels in self._by_topic.items()
         }
 
-    def channel_with(self, type: str) -> Channel | None:
+    def channel_with(self, type: str) -> protocol.Channel | None:
         """Return a channel that has the schema of a type, if there is one."""
         for channel in self._channels.values():
             if channel.schema and same_type(channel.schema_name, type):
@@ -202,51 +184,46 @@ class Session:
         A call for a topic that is subscribed applies changes of its listeners.
         """
         self.topics[topic.name] = topic
-        id = self._id_of.get(topic.name)
-        if id is not None:
-            channel = self._subscribed[id].channel
-            if _fits(topic, channel):
-                self._subscribed[id] = _subscribed(topic, channel)
-                return
-            self.unsubscribe(topic)
-            self.topics[topic.name] = topic
-        self._subscribe([topic.name])
+        self._match([topic.name])
 
     def unsubscribe(self, topic: Topic) -> None:
         """End the subscription to a topic."""
         self.topics.pop(topic.name, None)
-        id = self._id_of.pop(topic.name, None)
-        if id is not None:
-            del self._subscribed[id]
-            self._send(protocol.unsubscribe([id]))
+        self._match([topic.name])
 
-    def _subscribe(self, names: Iterable[str]) -> None:
-        """Subscribe to those topics that are wanted, offered and carried here."""
+    def _match(self, names: Iterable[str]) -> None:
+        """Make the subscriptions to topics agree with what is wanted and offered."""
+        gone: list[int] = []
         new: dict[int, int] = {}
-        for name in names:
-            topic = self.topics.get(name)
-            if topic is None or name in self._id_of:
-                continue
-            channel = self._choose(topic)
-            if channel is None:
-                continue
-            if not self._carries(channel.schema_name):
+        for name in dict.fromkeys(names):
+            topic, id = self.topics.get(name), self._id_of.get(name)
+            before = None if id is None else self._subscribed[id].channel
+            fits = [each for each in self.channels_of(name) if _fits(topic, each)]
+            channel = before if before in fits else next(iter(fits), None)
+            if channel is not None and not self._carries(channel.schema_name):
                 self._elsewhere()
+                channel = None
+            if id is not None and before is not None and before != channel:
+                if before.id in self._channels:  # else the server has ended it
+                    gone.append(id)
+                del self._subscribed[id], self._id_of[name]
+                id = None
+            if topic is None or channel is None:
                 continue
-            id = next(self._ids)
-            self._id_of[name] = id
+            if id is None:
+                id = self._id_of[name] = next(self._ids)
+                new[id] = channel.id
             self._subscribed[id] = _subscribed(topic, channel)
-            new[id] = channel.id
+        if gone:
+            self._send(protocol.unsubscribe(gone))
         if new:
             self._send(protocol.subscribe(new))
 
-    def _choose(self, topic: Topic) -> Channel | None:
-        channels = self.channels_of(topic.name)
-        return next((each for each in channels if _fits(topic, each)), None)
-
     # Questions.
 
-    async def call(self, service: Service, encoding: str, request: bytes) -> bytes:
+    async def call(
+        self, service: protocol.Service, encoding: str, request: bytes
+    ) -> bytes:
         """Call a service and return the bytes of its response.
 
         Raises:
@@ -255,17 +232,13 @@ class Session:
 
         """
         id = next(self._ids)
-        answer: asyncio.Future[bytes] = asyncio.Future()
-        self._calls[id] = answer
-        try:
-            self.send(protocol.call_service(service.id, id, encoding, request))
-            return await answer
-        finally:
-            self._calls.pop(id, None)
+        call = protocol.call_service(service.id, id, encoding, request)
+        answer: bytes = await self._ask(id, call)
+        return answer
 
     async def set_parameters(
         self, parameters: Iterable[protocol.Parameter]
-    ) -> ParameterValues:
+    ) -> protocol.ParameterValues:
         """Set parameters and return their new values.
 
         Raises:
@@ -273,18 +246,28 @@ class Session:
 
         """
         id = f"webmap-{next(self._ids)}"
-        answer: asyncio.Future[ParameterValues] = asyncio.Future()
-        self._questions[id] = answer
+        answer: protocol.ParameterValues = await self._ask(
+            id, protocol.set_parameters(parameters, id)
+        )
+        return answer
+
+    async def _ask(self, id: int | str, question: bytes) -> Any:
+        answer = self._questions[id] = asyncio.Future()
         try:
-            self.send(protocol.set_parameters(parameters, id))
+            self.send(question)
             return await answer
         finally:
             self._questions.pop(id, None)
 
+    def _unanswered(self, id: int | str | None) -> list[asyncio.Future[Any]]:
+        """Return what waits for the answer to a call or a question; of all for None."""
+        found = self._questions.values() if id is None else [self._questions.get(id)]
+        return [each for each in found if each is not None and not each.done()]
+
     @property
     def waits(self) -> bool:
         """Whether a call or a question is not answered yet."""
-        return bool(self._calls or self._questions)
+        return bool(self._questions)
 
     # The connection.
 
@@ -303,9 +286,7 @@ class Session:
         self._has_changed()
 
     def _closed(self, reason: str) -> None:
-        error = BridgeClosed(f"{self.connection.url}: {reason}")
-        error.why = reason
-        self._end(error)
+        self._end(BridgeClosed(f"{self.connection.url}: {reason}", reason))
         self._on_close(reason)
 
     def _failed(self, error: BridgeClosed) -> None:
@@ -314,13 +295,8 @@ class Session:
 
     def _end(self, error: BridgeClosed) -> None:
         self.failure = error
-        waiting: list[asyncio.Future[Any]] = [
-            *self._calls.values(),
-            *self._questions.values(),
-        ]
-        for answer in waiting:
-            if not answer.done():
-                answer.set_exception(error)
+        for answer in self._unanswered(None):
+            answer.set_exception(error)
         self._forget()
         self._has_changed()
 
@@ -337,15 +313,17 @@ class Session:
             try:
                 size, frame = whole_of(frame)
             except ProtocolError as error:
-                self._other(Malformed(str(error), size))
+                self._other(protocol.Malformed(str(error), size))
                 return
         event = protocol.receive(frame)
-        if isinstance(event, MessageData):
+        if isinstance(event, protocol.MessageData):
             self._message(event, frame, size)
         else:
             self._other(event)
 
-    def _message(self, event: MessageData, frame: bytes | bytearray, size: int) -> None:
+    def _message(
+        self, event: protocol.MessageData, frame: bytes | bytearray, size: int
+    ) -> None:
         subscribed = self._subscribed.get(event.subscription_id)
         if subscribed is None:
             return  # it was on its way when the subscription ended
@@ -355,12 +333,12 @@ class Session:
         message.size = size
         self._on_message(subscribed.topic, message)
 
-    def _other(self, event: Event) -> None:
+    def _other(self, event: protocol.Event) -> None:
         handle = _HANDLERS.get(type(event))
         if handle is not None:
             handle(self, event)
 
-    def _take_info(self, event: ServerInfo) -> None:
+    def _take_info(self, event: protocol.ServerInfo) -> None:
         first, self.info = self.info is None, event
         if not first:  # only its session is new
             return
@@ -369,15 +347,10 @@ class Session:
         self._informed()
         self._has_changed()
 
-    def _take_channels(self, event: Advertise) -> None:
+    def _take_channels(self, event: protocol.Advertise) -> None:
         faults, names, left_out = list(event.faults), [], 0
-        for channel in event.channels:
-            if not is_readable(channel):
-                continue
-            if channel.id in self._channels:  # it may have another schema now
-                ended = self._remove([channel.id])
-                if ended:
-                    self._send(protocol.unsubscribe(ended.values()))
+        for channel in filter(is_readable, event.channels):
+            names += self._remove([channel.id])  # it may have another schema now
             if len(self._channels) >= MOST_OFFERED:
                 left_out += 1
                 continue
@@ -390,34 +363,25 @@ class Session:
                 f"{left_out} more channels than {MOST_OFFERED}, which are left out"
             )
         self._complain_about(faults, "channels")
-        self._subscribe(names)
+        self._match(names)
         self._has_changed()
 
-    def _drop_channels(self, event: Unadvertise) -> None:
-        self._subscribe(self._remove(event.channel_ids))
+    def _drop_channels(self, event: protocol.Unadvertise) -> None:
+        self._match(self._remove(event.channel_ids))
         self._has_changed()
 
-    def _remove(self, ids: Iterable[int]) -> dict[str, int]:
-        """Forget channels; return the subscriptions that have ended, by topic."""
-        ended = {}
-        for id in ids:
-            channel = self._channels.pop(id, None)
-            if channel is None:
-                continue
+    def _remove(self, ids: Iterable[int]) -> list[str]:
+        """Forget channels; return their topics."""
+        names = []
+        for channel in filter(None, [self._channels.pop(id, None) for id in ids]):
             name = normalise_topic(channel.topic)
-            left = self._by_topic[name]
-            del left[id]
-            if not left:
+            names.append(name)
+            del self._by_topic[name][channel.id]
+            if not self._by_topic[name]:
                 del self._by_topic[name]
-            subscription = self._id_of.get(name)
-            if subscription is None:
-                continue
-            if self._subscribed[subscription].channel.id == id:
-                del self._subscribed[subscription], self._id_of[name]
-                ended[name] = subscription
-        return ended
+        return names
 
-    def _take_services(self, event: AdvertiseServices) -> None:
+    def _take_services(self, event: protocol.AdvertiseServices) -> None:
         faults = list(event.faults)
         room = MOST_OFFERED - len(self.services)
         if len(event.services) > room:
@@ -427,7 +391,7 @@ class Session:
         self._complain_about(faults, "services")
         self._has_changed()
 
-    def _drop_services(self, event: UnadvertiseServices) -> None:
+    def _drop_services(self, event: protocol.UnadvertiseServices) -> None:
         gone = set(event.service_ids)
         self.services = {
             name: each for name, each in self.services.items() if each.id not in gone
@@ -442,7 +406,7 @@ class Session:
             log.warning("%s", text)
             self._report(ProtocolError(text))
 
-    def _take_graph(self, event: ConnectionGraphUpdate) -> None:
+    def _take_graph(self, event: protocol.ConnectionGraphUpdate) -> None:
         for published in event.published_topics:
             self.publishers[published.name] = published.publisher_ids
         for subscribed in event.subscribed_topics:
@@ -454,82 +418,71 @@ class Session:
             self.publishers, self.subscribers = {}, {}  # nothing is known, then
         self._has_changed()
 
-    def _take_parameters(self, event: ParameterValues) -> None:
-        answer = self._questions.get(event.id or "")
-        if answer is not None and not answer.done():
+    def _take_parameters(self, event: protocol.ParameterValues) -> None:
+        for answer in self._unanswered(event.id or ""):
             answer.set_result(event)
 
-    def _take_response(self, event: ServiceCallResponse) -> None:
-        answer = self._calls.get(event.call_id)
-        if answer is not None and not answer.done():
+    def _take_response(self, event: protocol.ServiceCallResponse) -> None:
+        for answer in self._unanswered(event.call_id):
             answer.set_result(event.payload)
 
-    def _take_failure(self, event: ServiceCallFailure) -> None:
-        answer = self._calls.get(event.call_id)
-        if answer is not None and not answer.done():
+    def _take_failure(self, event: protocol.ServiceCallFailure) -> None:
+        for answer in self._unanswered(event.call_id):
             answer.set_exception(ServiceError(one_line(event.message)))
 
-    def _take_time(self, event: Time) -> None:
+    def _take_time(self, event: protocol.Time) -> None:
         self._server_time = True
         self.time = (event.time, time.monotonic())
 
-    def _take_status(self, event: Status) -> None:
+    def _take_status(self, event: protocol.Status) -> None:
         text = one_line(event.message)
         if text in self._statuses or len(self._statuses) >= MOST_STATUSES:
             return
         self._statuses.add(text)
         if event.level >= ERROR:
-            log.warning("%s: the bridge reports an error: %s", self._name, text)
-            self._report(
-                BridgeError(f"{self._name}: the bridge reports an error: {text}")
-            )
+            report_error(self._name, text, self._report)
         else:
             log.info("%s: the bridge reports: %s", self._name, text)
 
-    def _count(self, _event: Unknown) -> None:
+    def _count(self, _event: protocol.Unknown) -> None:
         self._stats.unknown += 1
 
-    def _complain(self, event: Malformed) -> None:
+    def _complain(self, event: protocol.Malformed) -> None:
         """Report a frame that is not Foxglove's protocol, also to one subscriber."""
         self._stats.malformed += 1
         if self._complained:
             return
         self._complained = True
-        error = ProtocolError(
-            f"{self._name} sent {event.size} bytes that are not Foxglove's protocol: "
-            f"{one_line(event.reason)}"
-        )
-        log.warning("%s", error, extra={"source": self._name})
-        self._report(error)
-        for topic in self.topics.values():
-            for listener in topic.listeners:
-                if listener.mention(error):
-                    return
+        reason = one_line(event.reason)
+        found = f"{event.size} bytes that are not Foxglove's protocol: {reason}"
+        report_malformed(self._name, found, self.topics.values(), self._report)
 
 
-def _fits(topic: Topic, channel: Channel) -> bool:
+def _fits(topic: Topic | None, channel: protocol.Channel) -> bool:
+    if topic is None:
+        return False
     stated = topic.message_type
     return stated is None or same_type(stated, channel.schema_name)
 
 
-def _subscribed(topic: Topic, channel: Channel) -> _Subscribed:
+def _subscribed(topic: Topic, channel: protocol.Channel) -> _Subscribed:
     raw = topic.options().encoding == "raw"
     kind, format = RawMessage if raw else FoxgloveMessage, format_of_channel(channel)
     return _Subscribed(topic, channel, partial(kind, format=format))
 
 
 _HANDLERS: dict[type[Any], Callable[[Session, Any], None]] = {
-    ServerInfo: Session._take_info,
-    Status: Session._take_status,
-    Advertise: Session._take_channels,
-    Unadvertise: Session._drop_channels,
-    AdvertiseServices: Session._take_services,
-    UnadvertiseServices: Session._drop_services,
-    ParameterValues: Session._take_parameters,
-    ConnectionGraphUpdate: Session._take_graph,
-    ServiceCallFailure: Session._take_failure,
-    ServiceCallResponse: Session._take_response,
-    Time: Session._take_time,
-    Unknown: Session._count,
-    Malformed: Session._complain,
+    protocol.ServerInfo: Session._take_info,
+    protocol.Status: Session._take_status,
+    protocol.Advertise: Session._take_channels,
+    protocol.Unadvertise: Session._drop_channels,
+    protocol.AdvertiseServices: Session._take_services,
+    protocol.UnadvertiseServices: Session._drop_services,
+    protocol.ParameterValues: Session._take_parameters,
+    protocol.ConnectionGraphUpdate: Session._take_graph,
+    protocol.ServiceCallFailure: Session._take_failure,
+    protocol.ServiceCallResponse: Session._take_response,
+    protocol.Time: Session._take_time,
+    protocol.Unknown: Session._count,
+    protocol.Malformed: Session._complain,
 }

@@ -89,44 +89,65 @@ def openness(
         dialect: ``ros1`` or ``ros2``; None if unknown.
 
     """
-    parts = urlsplit(url)
-    hidden = (
-        f" No topic is hidden from its clients ({', '.join(shown)} is shown)."
-        if shown
-        else ""
+    hidden = f" No topic is hidden from its clients ({', '.join(shown)} is shown)."
+    return openness_of(
+        "rosbridge",
+        facts,
+        url,
+        hidden if shown else "",
+        listen_advice(dialect, "this machine alone (address: 127.0.0.1)"),
+        f"{listen_advice(dialect, 'the robot alone or on a VPN (address)')} Hide "
+        "topics and services that no client needs (topics_glob, services_glob), and "
+        "use wss with a certificate.",
     )
+
+
+def openness_of(
+    kind: str, facts: LinkFacts, url: str, note: str, here_advice: str, advice: str
+) -> Finding:
+    """Return the finding about who can reach a bridge without sign-in.
+
+    Args:
+        kind: What people call the bridge.
+        facts: The results of the checks of the bridge.
+        url: Its address.
+        note: What to add if the bridge is open to the network.
+        here_advice: Advice for a bridge on this machine that others reach.
+        advice: Advice for a bridge on another machine.
+
+    """
+    parts = urlsplit(url)
     here = is_loopback(facts.peer or parts.hostname or "")
     outward = [each for each in facts.listens if not is_loopback(each)]
-    if here and facts.listens and not outward:
-        return Finding("good", BRIDGE, "The rosbridge listens on this machine alone.")
     if here and outward:
         return Finding(
             "warning",
             BRIDGE,
-            f"The rosbridge is on this machine and listens at {', '.join(outward)}: it "
-            f"has no sign-in, so everybody who reaches this machine can drive.",
-            listen_advice(dialect, "this machine alone (address: 127.0.0.1)"),
+            f"The {kind} is on this machine and listens at {', '.join(outward)}: it "
+            "has no sign-in, so everybody who reaches this machine can drive.",
+            here_advice,
         )
+    if here and facts.listens:
+        return Finding("good", BRIDGE, f"The {kind} listens on this machine alone.")
     if here:
         return Finding(
             "note",
             BRIDGE,
-            "The rosbridge was reached at an address of this machine; WebMap "
+            f"The {kind} was reached at an address of this machine; WebMap "
             "cannot see whether other machines reach it too.",
         )
+    encrypted = parts.scheme in ("wss", "foxgloves")
     secret = (
         "the connection is encrypted"
-        if parts.scheme == "wss"
+        if encrypted
         else "everybody on the network can read and change the messages"
     )
     return Finding(
-        "note" if parts.scheme == "wss" else "warning",
+        "note" if encrypted else "warning",
         BRIDGE,
-        f"The rosbridge is open to the network ({facts.peer or parts.hostname}): it "
-        f"has no sign-in, so everybody who reaches it can drive; {secret}.{hidden}",
-        f"{listen_advice(dialect, 'the robot alone or on a VPN (address)')} Hide "
-        "topics and services that no client needs (topics_glob, services_glob), and "
-        "use wss with a certificate.",
+        f"The {kind} is open to the network ({facts.peer or parts.hostname}): it "
+        f"has no sign-in, so everybody who reaches it can drive; {secret}.{note}",
+        advice,
     )
 
 
@@ -166,11 +187,7 @@ def blocking(facts: LinkFacts, url: str, dialect: str | None) -> Finding:
             advice,
         )
     if facts.no_result:
-        return Finding(
-            "note",
-            BRIDGE,
-            f"The test of a slow service call gave no result: {facts.no_result}.",
-        )
+        return no_result(facts)
     if dialect is None:
         return Finding(
             "note",
@@ -192,6 +209,12 @@ def blocking(facts: LinkFacts, url: str, dialect: str | None) -> Finding:
         "rosbridge for ROS 1 makes each call in a thread of its own, so a call that "
         "hangs blocks nothing.",
     )
+
+
+def no_result(facts: LinkFacts, advice: str = "") -> Finding:
+    """Return the finding that a slow service call was tried without a result."""
+    text = f"The test of a slow service call gave no result: {facts.no_result}."
+    return Finding("note", BRIDGE, text, advice)
 
 
 def compression(facts: LinkFacts, packed: Sequence[str]) -> Finding:

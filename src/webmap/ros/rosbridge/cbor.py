@@ -44,7 +44,7 @@ def decode(frame: bytes | bytearray) -> dict[str, Any]:
             max_depth=MAX_DEPTH,
             strict_hashable_types=True,
             semantic_decoders=_DECODERS,
-            tag_hook=_unknown_tag,
+            tag_hook=lambda tag, *_: _refuse(tag.tag),
         )
     except (
         cbor2.CBORError,
@@ -75,18 +75,11 @@ def typed_array(tag: int, value: object, _immutable: bool = False) -> "array[Any
     return numbers
 
 
-def _refuse(tag: int) -> Callable[[Any, bool], NoReturn]:
-    def refuse(_value: Any, _immutable: bool) -> NoReturn:
-        raise ValueError(f"tag {tag} has no place in a ROS message")
-
-    return refuse
-
-
-def _unknown_tag(tag: Any, _immutable: bool) -> NoReturn:
-    raise ValueError(f"tag {tag.tag} has no place in a ROS message")
+def _refuse(tag: int, *_: Any) -> NoReturn:
+    raise ValueError(f"tag {tag} has no place in a ROS message")
 
 
 _DECODERS: dict[int, Callable[[Any, bool], Any]] = {
-    **{tag: _refuse(tag) for tag in (*_REFUSED, *_REFUSED_TOO)},
+    **{tag: partial(_refuse, tag) for tag in (*_REFUSED, *_REFUSED_TOO)},
     **{tag: partial(typed_array, tag) for tag in TYPED_ARRAY_TAGS},
 }

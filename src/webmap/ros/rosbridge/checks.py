@@ -125,7 +125,6 @@ async def tried_a_call(facts: LinkFacts, url: str) -> LinkFacts:
         url: Its address; its rosapi is known to respond.
 
     """
-    facts = not_tried(facts)
     try:
         free = await try_a_call(url)
     except (OSError, TimeoutError) as error:

@@ -82,11 +82,6 @@ class BridgeGraph:
         nodes = await self.nodes("publishers", topic)
         return None if nodes is None else bool(nodes)
 
-    async def other_publishers(self, topic: str) -> list[str] | None:
-        """Return the publishers of ``topic``, without those for clients of a bridge."""
-        nodes = await self.nodes("publishers", topic)
-        return nodes and [name for name in nodes if not is_client_node(name)]
-
     async def nodes(
         self, kind: Literal["publishers", "subscribers"], topic: str
     ) -> list[str] | None:

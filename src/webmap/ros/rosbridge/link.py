@@ -6,15 +6,18 @@ listeners and decides what may be published.
 
 import logging
 import time
-from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Unpack
 
-from webmap.base.errors import BridgeError, ProtocolError
+from webmap.base.errors import BridgeError
 from webmap.base.identifiers import generate_id
-from webmap.base.text import one_line
-from webmap.ros.link import ReconnectingLink
+from webmap.ros.link import (
+    LinkCallbacks,
+    ReconnectingLink,
+    report_error,
+    report_malformed,
+)
 from webmap.ros.names import split_type
-from webmap.ros.received_message import ReceivedMessage
 from webmap.ros.rosbridge import ops
 from webmap.ros.rosbridge.calls import Calls
 from webmap.ros.rosbridge.events import (
@@ -50,31 +53,17 @@ class RosbridgeLink(ReconnectingLink):
     Args:
         url: The bridge's address.
         name: The bridge's name, as shown to people.
-        opened: Called when the connection is open.
-        closed: Called with the reason when an open connection has ended.
-        received: Called with each message of a subscribed topic; returns whether the
-            message can be used.
-        report: Called with each error that a person may need to know.
+        callbacks: Those of the bridge.
 
     """
 
     lane_type: type[BridgeConnection] = BridgeConnection
     """The kind of its connections."""
 
-    def __init__(
-        self,
-        url: str,
-        name: str,
-        *,
-        opened: Callable[[], None],
-        closed: Callable[[str], None],
-        received: Callable[[Topic, ReceivedMessage], bool],
-        report: Callable[[Exception], None],
-    ) -> None:
-        super().__init__(name, opened, closed, report)
+    def __init__(self, url: str, name: str, **callbacks: Unpack[LinkCallbacks]) -> None:
+        super().__init__(name, **callbacks)
         self.graph = BridgeGraph(self.call_service)
         self._url = url
-        self._on_message = received
         self._protocol = Protocol()
         self._calls = Calls(url, self.lane_type)
         self._subscriptions: dict[str, WireSubscription] = {}
@@ -185,32 +174,17 @@ class RosbridgeLink(ReconnectingLink):
             self.stats.malformed += 1
             if not self._complained:
                 self._complained = True
-                self._complain(event)
+                topics = [each.topic for each in self._subscriptions.values()]
+                found = f"{event.size} bytes that are not rosbridge: {event.reason}"
+                report_malformed(self._name, found, topics, self._report)
         elif isinstance(event, Unknown):
             self.stats.unknown += 1
         elif isinstance(event, Status) and event.level == "error":
-            text = one_line(event.msg)
-            log.warning("%s: the bridge reports an error: %s", self._name, text)
-            self._report(
-                BridgeError(f"{self._name}: the bridge reports an error: {text}")
-            )
+            report_error(self._name, event.msg, self._report)
         elif isinstance(event, CallService):
             answer = "this client offers no services"
             id = None if event.id is None else str(event.id)
             self._send(ops.service_response(event.service, answer, id=id, result=False))
-
-    def _complain(self, event: Malformed) -> None:
-        """Report a frame that is not rosbridge, also to one subscriber."""
-        error = ProtocolError(
-            f"{self._name} sent {event.size} bytes that are not rosbridge: "
-            f"{event.reason}"
-        )
-        log.warning("%s", error, extra={"source": self._name})
-        self._report(error)
-        for subscription in self._subscriptions.values():
-            for listener in subscription.topic.listeners:
-                if listener.mention(error):
-                    return
 
     def _too_large(self, topic: Topic, size: int | None) -> None:
         """Report a topic whose messages are too large for the bridge's CBOR.

@@ -41,17 +41,10 @@ def _frame(**fields: Any) -> bytes:
         raise ValueError("the message is nested too deeply for JSON") from None
 
 
-def advertise(
-    topic: str, type: str, *, id: str, queue_size: int = 1, latch: bool = False
-) -> bytes:
-    """Advertise ``type`` on ``topic``."""
+def advertise(topic: str, type: str, *, id: str) -> bytes:
+    """Advertise ``type`` on ``topic``; no message is latched."""
     return _frame(
-        op="advertise",
-        id=id,
-        topic=topic,
-        type=type,
-        queue_size=queue_size,
-        latch=latch,
+        op="advertise", id=id, topic=topic, type=type, queue_size=1, latch=False
     )
 
 
@@ -60,7 +53,7 @@ def unadvertise(topic: str, *, id: str | None = None) -> bytes:
     return _frame(op="unadvertise", id=id, topic=topic)
 
 
-def publish(topic: str, message: Mapping[str, Any], *, id: str | None = None) -> bytes:
+def publish(topic: str, message: Mapping[str, Any]) -> bytes:
     """Publish ``message``, a mapping of the message's fields, on ``topic``.
 
     Raises:
@@ -68,7 +61,7 @@ def publish(topic: str, message: Mapping[str, Any], *, id: str | None = None) ->
         TypeError: If a value in the message has no form in JSON.
 
     """
-    return _frame(op="publish", id=id, topic=topic, msg=message)
+    return _frame(op="publish", topic=topic, msg=message)
 
 
 def subscribe(
@@ -79,7 +72,6 @@ def subscribe(
     throttle_rate: int = 0,
     queue_length: int = 1,
     compression: str | None = None,
-    fragment_size: int | None = None,
 ) -> bytes:
     """Subscribe to ``topic``.
 
@@ -116,7 +108,6 @@ def subscribe(
             :data:`BURST` messages.
         queue_length: Most messages that the bridge may queue, at least 1.
         compression: ``"none"``, ``"png"``, ``"cbor"`` or ``"cbor-raw"``.
-        fragment_size: Largest frame to be sent in one piece, in bytes.
 
     """
     is_binary = compression in ("cbor", "cbor-raw")
@@ -130,7 +121,6 @@ def subscribe(
         throttle_rate=max(throttle_rate, LEAST_THROTTLE),
         queue_length=max(queue_length, least_queue),
         compression=compression,
-        fragment_size=fragment_size,
     )
 
 
@@ -185,8 +175,3 @@ def service_response(
 def status(level: str, message: str, *, id: str | None = None) -> bytes:
     """Send a status message: ``level`` is error, warning, info or none."""
     return _frame(op="status", id=id, level=level, msg=message)
-
-
-def set_level(level: str) -> bytes:
-    """Request status messages from ``level`` on: error, warning, info or none."""
-    return _frame(op="set_level", level=level)

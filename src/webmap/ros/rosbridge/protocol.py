@@ -5,9 +5,6 @@ See Also:
 
 """
 
-import base64
-import binascii
-import io
 import math
 import re
 from functools import lru_cache
@@ -32,44 +29,6 @@ from webmap.ros.rosbridge.events import (
     check_count,
 )
 from webmap.ros.sockets.frame_reader import SHORTENED, whole_of
-
-
-def decode_png(data: str, *, max_bytes: int = MAX_OTHER) -> bytes:
-    """Return the text in the pixels of a PNG given in base64 (protocol, 2.2.3).
-
-    Raises:
-        ProtocolError: If the data is not an RGB picture in PNG, or has more than
-            ``max_bytes`` of pixels.
-
-    """
-    try:
-        packed = base64.b64decode(data, validate=True)
-    except (binascii.Error, ValueError) as error:
-        raise ProtocolError(f"a PNG that is not base64: {error}") from None
-    return _pixels(packed, max_bytes).rstrip(b"\n")
-
-
-def _pixels(packed: bytes, max_bytes: int) -> bytes:
-    from PIL import Image
-
-    # The first 24 bytes hold the size: refuse the PNG before unpacking it.
-    width = int.from_bytes(packed[16:20], "big")
-    height = int.from_bytes(packed[20:24], "big")
-    if width * height * 3 > max_bytes:
-        raise ProtocolError(
-            f"a PNG of {width} x {height}, which is too large: it holds "
-            f"{width * height * 3} bytes, and the limit is {max_bytes}; subscribe "
-            "with compression='cbor'"
-        )
-    try:
-        with Image.open(io.BytesIO(packed), formats=["PNG"]) as image:
-            if image.mode != "RGB" or image.size != (width, height):
-                raise ProtocolError(f"expected an RGB picture, got {image.mode}")
-            return image.tobytes()
-    except ProtocolError:
-        raise
-    except Exception as error:  # Pillow raises the errors of its parsers
-        raise ProtocolError(f"not a PNG: {error!r}") from None
 
 
 class TextFragment(msgspec.Struct, frozen=True):
@@ -111,17 +70,6 @@ class _Assembly:
             self.messages = max(self.messages, 2)
         self.pieces[fragment.num] = data
 
-    @property
-    def is_complete(self) -> bool:
-        return self.received >= self.count * self.messages
-
-    @property
-    def is_ambiguous(self) -> bool:
-        return self.messages > 1
-
-    def text(self) -> bytes:
-        return b"".join(self.pieces[num] for num in range(self.count))
-
 
 class Fragments:
     """The messages of one connection that came in part (rosbridge protocol, 2.2.2).
@@ -161,24 +109,27 @@ class Fragments:
                 messages were mixed; the pieces of the message are then dropped.
 
         """
-        self._expire(now)
+        for key, assembly in list(self._open.items()):
+            if now - assembly.began > self.max_age:
+                del self._open[key]
         self._check(fragment)
         key = (fragment.id, fragment.total)
-        assembly = self._open.get(key)
-        if assembly is None:
-            assembly = self._open[key] = _Assembly(fragment.count, now)
-            self._bound_open()
+        if key not in self._open:
+            self._open[key] = _Assembly(fragment.count, now)
+            if len(self._open) > self.MAX_OPEN:
+                del self._open[next(iter(self._open))]
+        assembly = self._open[key]
         assembly.add(fragment)
         self._bound_bytes(key)
-        if not assembly.is_complete:
+        if assembly.received < assembly.count * assembly.messages:
             return None
         del self._open[key]
-        if assembly.is_ambiguous:
+        if assembly.messages > 1:
             raise ProtocolError(
                 f"{assembly.messages} messages of {assembly.count} fragments each "
                 f"interleave under id {fragment.id!r}: they cannot be distinguished"
             )
-        return assembly.text()
+        return b"".join(assembly.pieces[num] for num in range(assembly.count))
 
     def _check(self, fragment: TextFragment) -> None:
         if not math.isfinite(fragment.total) or fragment.count < 1:
@@ -190,15 +141,6 @@ class Fragments:
             )
         if not 0 <= fragment.num < fragment.count:
             raise ProtocolError(f"fragment {fragment.num} of {fragment.count}")
-
-    def _expire(self, now: float) -> None:
-        late = [k for k, a in self._open.items() if now - a.began > self.max_age]
-        for key in late:
-            del self._open[key]
-
-    def _bound_open(self) -> None:
-        while len(self._open) > self.MAX_OPEN:
-            del self._open[next(iter(self._open))]
 
     def _bound_bytes(self, key: tuple[object, float]) -> None:
         if sum(assembly.size for assembly in self._open.values()) > self.max_bytes:
@@ -224,10 +166,6 @@ class _Op(msgspec.Struct):
 class _Topic(msgspec.Struct):
     topic: str
     msg: msgspec.Raw
-
-
-class _Png(msgspec.Struct):
-    data: str
 
 
 class _CborTopic(msgspec.Struct):
@@ -298,33 +236,22 @@ class Protocol:
             return Publish(decode_json(frame, _Topic).topic, frame)
         if op in _PLAIN_EVENTS:
             return _flat(decode_json(frame, _PLAIN_EVENTS[op]))
-        if op in ("fragment", "png"):
-            return self._unwrap(op, frame, now, nested=nested)
+        if op == "fragment":
+            return self._join(decode_json(frame, TextFragment), now, nested=nested)
         return Unknown(op[:64])
 
-    def _unwrap(
-        self, op: str, frame: bytes | bytearray, now: float, *, nested: bool
+    def _join(
+        self, fragment: TextFragment, now: float, *, nested: bool
     ) -> Event | None:
-        if op == "png":
-            inner = decode_png(decode_json(frame, _Png).data)
-            return self._read_inner(inner, now)
         if nested:
             raise ProtocolError("a fragment within another wrapping")
-        text = self._fragments.add(decode_json(frame, TextFragment), now)
+        text = self._fragments.add(fragment, now)
         if text is None:
             return None
         event = self._read(text, now, nested=True)
         if isinstance(event, Publish):
             event.in_parts = True
         return event
-
-    def _read_inner(self, frame: bytes | bytearray, now: float) -> Event | None:
-        if topic_in_head(frame) is None and decode_json(frame, _Op).op in (
-            "fragment",
-            "png",
-        ):
-            raise ProtocolError("a PNG that holds another wrapping")
-        return self._read(frame, now, nested=True)
 
 
 def _check_other(frame: bytes | bytearray) -> None:

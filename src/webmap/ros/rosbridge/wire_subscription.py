@@ -234,21 +234,12 @@ class WireSubscription:
         if self._asked is None or self._asked.compression != asked.compression:
             self._asked_at = time.monotonic()
         self._asked, self._id = asked, generate_id()
-        self._send(
-            ops.subscribe(
-                self.topic.name,
-                id=self._id,
-                type=asked.type,
-                throttle_rate=asked.throttle,
-                queue_length=asked.queue_length,
-                compression=asked.compression,
-            )
-        )
+        self._send(ops.subscribe(self.topic.name, id=self._id, **asked._asdict()))
 
 
 class _Asked(NamedTuple):
     type: str | None
-    throttle: int
+    throttle_rate: int
     queue_length: int
     compression: str | None
 

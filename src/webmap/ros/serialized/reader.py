@@ -21,11 +21,7 @@ from webmap.ros.serialized.schemas import Encoding, Schema
 Reader: TypeAlias = Callable[[bytes | bytearray | memoryview], Any]
 
 _NATIVE_IS_BIG = sys.byteorder == "big"
-_KINDS = {
-    2: "PL_CDR",
-    3: "PL_CDR",
-    **dict.fromkeys(range(6, 12), "XCDR2"),
-}
+_KINDS = dict.fromkeys((2, 3), "PL_CDR") | dict.fromkeys(range(6, 12), "XCDR2")
 
 
 @lru_cache(maxsize=512)

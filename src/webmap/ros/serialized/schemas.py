@@ -89,12 +89,7 @@ def read_schema(type: str, encoding: SchemaEncoding, text: str | None = None) ->
     if text is None:
         known = shipped(ros2)
     else:
-        texts = (
-            messages_of(text)
-            if encoding == "ros2idl"
-            else split_texts(text, name, ros2=ros2)
-        )
-        plain = {str(split_type(each)): found for each, found in texts.items()}
+        plain = texts_in(text, encoding, name)
         if ros2 and any(map(_WIDE.search, plain.values())):
             raise ConfigError(
                 f"{name} has a field of wstring, whose bytes differ between vendors"
@@ -111,6 +106,25 @@ def read_schema(type: str, encoding: SchemaEncoding, text: str | None = None) ->
             f"which is {MAX_FRAME} bytes"
         )
     return schema
+
+
+def texts_in(text: str, encoding: str, name: str) -> dict[str, str]:
+    """Return the text of each type in a schema, as ``.msg``, by the names of the types.
+
+    Args:
+        text: The schema.
+        encoding: Its language.
+        name: The name of its first type.
+
+    Raises:
+        ConfigError: If the text is invalid.
+
+    """
+    if encoding == "ros2idl":
+        texts = messages_of(text)
+    else:
+        texts = split_texts(text, name, ros2=encoding != "ros1msg")
+    return {str(split_type(each)): found for each, found in texts.items()}
 
 
 def _every_field(fields: Sequence[Field], encoding: Encoding) -> Iterator[Field]:

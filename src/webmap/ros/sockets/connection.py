@@ -307,8 +307,7 @@ def _not_reached(named: str, url: str, error: Exception) -> BridgeClosed:
         why += f"; if a Foxglove bridge is there, its address is {address}"
     elif "HTTP 400" in why:
         why += ": it accepts none of the subprotocols that WebMap knows"
-    closed = BridgeClosed(f"cannot reach the {named} at {url}: {why}")
-    closed.why = why
+    closed = BridgeClosed(f"cannot reach the {named} at {url}: {why}", why)
     closed.__cause__ = error
     return closed
 

@@ -3,20 +3,24 @@
 import base64
 import io
 import math
-from collections.abc import Sequence
-from typing import Any
+from array import array
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import cbor2
 import msgspec
-import numpy as np
 
 from webmap.ros.definitions import OCTETS, Field
 from webmap.ros.rosbridge.server.dialect import Quirks
-from webmap.ros.rosbridge.server.schema import Schema
 from webmap.ros.serialized.writer import serialize
+
+if TYPE_CHECKING:
+    from webmap.ros.rosbridge.server.schema import Schema
 
 # RFC 8746: typed arrays, little-endian.
 _ARRAY_TAGS = {
+    "u1": 64,
     "u2": 69,
     "u4": 70,
     "u8": 71,
@@ -30,19 +34,17 @@ _ARRAY_TAGS = {
 _NAN = msgspec.Raw(b"NaN")
 
 
+@dataclass(slots=True, eq=False)
 class Publication:
     """A message on a topic; each encoding is made once for all subscribers."""
 
-    __slots__ = ("_forms", "message", "stamp", "topic", "type")
+    topic: str
+    type: str
+    message: dict[str, Any]
+    stamp: float
+    """When it was published, in seconds since 1970."""
 
-    def __init__(
-        self, topic: str, type_name: str, message: dict[str, Any], stamp: float
-    ) -> None:
-        self.topic = topic
-        self.type = type_name
-        self.message = message
-        self.stamp = stamp
-        self._forms: dict[str, str | bytes | None] = {}
+    _forms: dict[str, str | bytes | None] = field(default_factory=dict, init=False)
 
     def form(self, compression: str, encoder: "Encoder") -> str | bytes | None:
         """Return the frame, or None if this server cannot send that encoding."""
@@ -67,7 +69,7 @@ class Encoder:
     """
 
     def __init__(
-        self, schema: Schema, quirks: Quirks, max_message_size: int = MAX_MESSAGE_SIZE
+        self, schema: "Schema", quirks: Quirks, max_message_size: int = MAX_MESSAGE_SIZE
     ) -> None:
         self.schema = schema
         self.quirks = quirks
@@ -76,7 +78,7 @@ class Encoder:
 
     def json(self, operation: dict[str, Any]) -> str:
         """Return an operation as JSON; NaN and infinity become ``null``."""
-        text = msgspec.json.encode(operation, enc_hook=_plain).decode()
+        text = to_json(operation).decode()
         return text.replace("/", "\\/") if self.quirks.escaped_slashes else text
 
     def publication(
@@ -104,7 +106,7 @@ class Encoder:
     ) -> bytes | None:
         if self.quirks.no_fixed_array_cbor and self.has_fixed_array(publication.type):
             return None
-        return cbor2.dumps(operation, default=_tag_array)
+        return to_cbor(operation)
 
     def _cbor_raw(self, publication: Publication) -> bytes:
         seconds, rest = divmod(round(publication.stamp * 1e9), 1_000_000_000)
@@ -176,14 +178,28 @@ def _has_fixed_array(fields: Sequence[Field]) -> bool:
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
+    if hasattr(value, "tolist"):  # an array, of numpy or of the standard library
         return value.tolist()
     raise TypeError(f"a message cannot hold a {type(value)}")
 
 
+to_json: Callable[[dict[str, Any]], bytes] = msgspec.json.Encoder(
+    enc_hook=_plain
+).encode
+"""Returns an operation in JSON: bytes in base64, and null for NaN and infinities."""
+
+
+def to_cbor(operation: dict[str, Any]) -> bytes:
+    """Return an operation in CBOR, with arrays of numbers as typed arrays."""
+    return cbor2.dumps(operation, default=_tag_array)
+
+
 def _tag_array(encoder: cbor2.CBOREncoder, value: Any) -> None:
-    if not isinstance(value, np.ndarray):
+    import numpy as np  # an agent may never need it
+
+    if not isinstance(value, np.ndarray | array):
         raise TypeError(f"a message cannot hold a {type(value)}")
+    value = np.asarray(value)
     tag = _ARRAY_TAGS.get(value.dtype.str[1:])
     if tag is None:
         raise TypeError(f"no typed array for {value.dtype}")

@@ -1,5 +1,6 @@
 """The ROS graph behind the server: topics, services, actions and their nodes."""
 
+import asyncio
 import logging
 import time
 from collections.abc import Callable, Mapping
@@ -95,9 +96,14 @@ class Graph:
         self.topics: dict[str, GraphTopic] = {}
         self.services: dict[str, Service] = {}
         self.actions: dict[str, ActionServer] = {}
+        self.refusal = ""
+        """Why there may be no new publisher and no new service; empty if there may."""
+        self.subscribed = asyncio.Event()
+        """Set at the first subscription."""
 
-    def refuse_new(self) -> None:
-        """Raise GraphError if there may be no new publisher and no new service."""
+    def _refuse_new(self) -> None:
+        if self.refusal:
+            raise GraphError(self.refusal)
 
     def advertise(
         self,
@@ -115,7 +121,7 @@ class Graph:
                 publisher is allowed.
 
         """
-        self.refuse_new()
+        self._refuse_new()
         topic = self._topic(name, type_name)
         topic.publishers[owner] = node
         if latch:
@@ -147,6 +153,7 @@ class Graph:
         topic = self._topic(name, type_name)
         topic.subscribers[owner] = (node, deliver)
         self.repeat_latched(topic.name, deliver)
+        self.subscribed.set()
 
     def repeat_latched(self, name: str, deliver: Deliver) -> None:
         """Deliver the latched messages of a topic."""
@@ -212,7 +219,7 @@ class Graph:
             GraphError: If no new service is allowed.
 
         """
-        self.refuse_new()
+        self._refuse_new()
         name = resolve(name)
         self.services[name] = Service(name, canonical(type_name), node, owner, handle)
 

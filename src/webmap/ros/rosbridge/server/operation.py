@@ -3,6 +3,7 @@
 import math
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
 from webmap.ros.rosbridge.server.encode import Encoder, Publication
@@ -99,28 +100,22 @@ class Outbox:
             self._order = deque(entry for entry in self._order if entry != topic)
 
 
+@dataclass(eq=False, repr=False)
 class Client:
-    """One client of the server: its graph, and its outgoing frames.
+    """One client of the server: its graph, and its outgoing frames."""
 
-    Args:
-        graph: The ROS graph that the client sees.
-        encoder: Builds the frames; its quirks are those of the client's server.
-        clock: Returns monotonic seconds.
-        wake: Called when the outbox or a throttled subscription has a frame to send.
+    graph: Graph
+    """The ROS graph that the client sees."""
 
-    """
+    encoder: Encoder
+    """Builds the frames; its quirks are those of the client's server."""
 
-    def __init__(
-        self,
-        graph: Graph,
-        encoder: Encoder,
-        clock: Callable[[], float],
-        wake: Callable[[], None],
-    ) -> None:
-        self.graph = graph
-        self.encoder = encoder
-        self.now = clock
-        self.wake = wake
-        self.outbox = Outbox()
-        self.spinning = False
-        """Whether the whole server hangs because of this client."""
+    clock: Callable[[], float]
+    """Returns monotonic seconds."""
+
+    wake: Callable[[], None]
+    """Called when the outbox or a throttled subscription has a frame to send."""
+
+    outbox: Outbox = field(default_factory=Outbox, init=False)
+    spinning: bool = field(default=False, init=False)
+    """Whether the whole server hangs because of this client."""

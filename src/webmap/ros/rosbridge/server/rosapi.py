@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from webmap.ros.definitions import FLOATS, INTEGERS, TIMES, Field, UnknownType
@@ -37,16 +38,19 @@ class Rosapi:
             "services_for_type": ("ServicesForType", self._services_for_type),
             "service_type": ("ServiceType", self._service_type),
             "service_providers": ("ServiceProviders", self._service_providers),
-            "service_request_details": ("ServiceRequestDetails", self._request_details),
+            "service_request_details": (
+                "ServiceRequestDetails",
+                partial(self._details, "Request"),
+            ),
             "service_response_details": (
                 "ServiceResponseDetails",
-                self._response_details,
+                partial(self._details, "Response"),
             ),
             "publishers": ("Publishers", self._publishers),
             "subscribers": ("Subscribers", self._subscribers),
             "nodes": ("Nodes", self._nodes),
             "node_details": ("NodeDetails", self._node_details),
-            "message_details": ("MessageDetails", self._message_details),
+            "message_details": ("MessageDetails", partial(self._details, "")),
             "action_servers": ("GetActionServers", self._action_servers),
             "get_time": ("GetTime", self._get_time),
             "get_param": ("GetParam", self._get_param),
@@ -158,20 +162,13 @@ class Rosapi:
             "services": sorted(s.name for s in services if s.node == node),
         }
 
-    def _message_details(self, request: Args) -> Any:
-        return self._details(request["type"], request["type"])
-
-    def _request_details(self, request: Args) -> Any:
-        return self._details(request["type"], f"{canonical(request['type'])}Request")
-
-    def _response_details(self, request: Args) -> Any:
-        return self._details(request["type"], f"{canonical(request['type'])}Response")
-
-    def _details(self, asked: str, type_name: str) -> Any:
+    def _details(self, part: str, request: Args) -> Any:
+        name = f"{canonical(request['type'])}{part}"
         try:
-            return {"typedefs": type_definitions(self.graph.schema, type_name)}
+            return {"typedefs": type_definitions(self.graph.schema, name)}
         except UnknownType:
-            raise ServiceFailed(f"Unable to load the type {asked}") from None
+            why = f"Unable to load the type {request['type']}"
+            raise ServiceFailed(why) from None
 
     def _action_servers(self, _: Args) -> Any:
         names = set(self.graph.actions)

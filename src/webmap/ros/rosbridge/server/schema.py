@@ -21,21 +21,9 @@ from webmap.ros.definitions import (
 )
 from webmap.ros.message_check import MessageCheck, Misfit, check_size, wrong
 from webmap.ros.rosbridge.server.dialect import Dialect, canonical
+from webmap.ros.serialized.schemas import CODES
 
-DTYPES: dict[str, str] = {
-    "int8": "<i1",
-    "uint8": "<u1",
-    "byte": "<u1",
-    "char": "<u1",
-    "int16": "<i2",
-    "uint16": "<u2",
-    "int32": "<i4",
-    "uint32": "<u4",
-    "int64": "<i8",
-    "uint64": "<u8",
-    "float32": "<f4",
-    "float64": "<f8",
-}
+DTYPES = {name: f"<{code}" for name, code in CODES.items() if name != "bool"}
 """The numeric types and their little-endian format."""
 
 
@@ -146,9 +134,8 @@ class _FromClient(MessageCheck):
         return items
 
     def number(self, field: Field, value: Any) -> float:
-        if isinstance(value, bool) and not self.ros2:
-            raise wrong(value, "a number")
-        if not isinstance(value, int | float):
+        refused = isinstance(value, bool) and not self.ros2
+        if refused or not isinstance(value, int | float):
             raise wrong(value, "a number")
         number = _as_float(value)
         if self._finite and not math.isfinite(number):

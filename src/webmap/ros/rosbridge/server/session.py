@@ -4,13 +4,13 @@ import json
 import logging
 from collections import deque
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from itertools import count
 from typing import Any
 
 from webmap.ros.rosbridge.server.dialect import canonical, resolve
-from webmap.ros.rosbridge.server.encode import Encoder
-from webmap.ros.rosbridge.server.graph import GoalHandle, Graph, GraphError, Respond
+from webmap.ros.rosbridge.server.graph import GoalHandle, GraphError, Respond
 from webmap.ros.rosbridge.server.operation import Client, Handlers, Operation, text
 from webmap.ros.rosbridge.server.topics import Topics
 
@@ -19,26 +19,11 @@ log = logging.getLogger("webmap.sim")
 _MOST_INPUT = 10_000
 
 
+@dataclass(eq=False, repr=False)
 class Session(Client):
-    """Handles a client's frames, and builds the frames for the client.
+    """Handles a client's frames, and builds the frames for the client."""
 
-    Args:
-        graph: The ROS graph that the client sees.
-        encoder: Builds the frames; its quirks are those of the session.
-        clock: Returns monotonic seconds.
-        wake: Called when :meth:`next_frames` may return frames.
-
-    """
-
-    def __init__(
-        self,
-        graph: Graph,
-        encoder: Encoder,
-        *,
-        clock: Callable[[], float],
-        wake: Callable[[], None],
-    ) -> None:
-        super().__init__(graph, encoder, clock, wake)
+    def __post_init__(self) -> None:
         self._incoming = IncomingText()
         self._queued: deque[Operation] = deque()
         self._blocked_by: object | None = None
@@ -247,7 +232,7 @@ class Services:
 
     def poll(self) -> float | None:
         """End the calls whose time is over; return seconds to the next one, if any."""
-        now = self._client.now()
+        now = self._client.clock()
         for due, respond in list(self._timed.values()):
             if now >= due:
                 respond("Timeout exceeded while waiting for service response", ok=False)
@@ -279,7 +264,7 @@ class Services:
 
         timeout = operation.get("timeout", CALL_TIMEOUT)
         if self._client.encoder.quirks.timed_calls and timeout > 0:
-            self._timed[number] = (self._client.now() + timeout, respond)
+            self._timed[number] = (self._client.clock() + timeout, respond)
             self._client.wake()
         self._graph.call(service, operation.get("args", {}), respond)
 

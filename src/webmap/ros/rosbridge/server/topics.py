@@ -136,7 +136,7 @@ class Topics:
 
     def poll(self) -> float | None:
         """Release throttled messages; return seconds to the next one, if any."""
-        now = self._client.now()
+        now = self._client.clock()
         for subscription in self._subscriptions.values():
             subscription.poll(now)
         dues = [s.next_due for s in self._subscriptions.values()]
@@ -261,7 +261,7 @@ class Topics:
     def _deliver(
         self, subscription: ClientSubscription, publication: Publication
     ) -> None:
-        subscription.offer(publication, self._client.now())
+        subscription.offer(publication, self._client.clock())
         if subscription.next_due is not None:
             self._client.wake()
 
