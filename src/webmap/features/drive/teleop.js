@@ -44,8 +44,7 @@ const NOT_YOURS = "You may look and press STOP. The robot's own operators can dr
  * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
-  const teleop = new Teleop(map, options, send);
-  return { destroy: () => teleop.destroy() };
+  return new Teleop(map, options, send);
 }
 
 /** Instead of the keys that drive, after a driving key without its position. */

@@ -36,11 +36,7 @@ import { showNote, tool, toolName } from "../../web/tools/tool.js";
  * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
-  const attached = new GoalTool(map, options, send);
-  return {
-    receive: (message) => attached.receive(message),
-    destroy: () => attached.destroy(),
-  };
+  return new GoalTool(map, options, send);
 }
 
 class GoalTool {

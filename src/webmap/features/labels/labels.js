@@ -25,11 +25,7 @@ import { claimPresses, showNote, tool, toolName } from "../../web/tools/tool.js"
  * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
-  const labels = new Labels(map, options, send);
-  return {
-    receive: (message) => labels.receive(message),
-    destroy: () => labels.destroy(),
-  };
+  return new Labels(map, options, send);
 }
 
 class Labels {

@@ -30,11 +30,7 @@ const TOO_SHORT = `A loop needs at least ${LEAST_LOOP} points.`;
  * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
-  const tool = new RouteTool(map, options, send);
-  return {
-    receive: (message) => tool.receive(message),
-    destroy: () => tool.destroy(),
-  };
+  return new RouteTool(map, options, send);
 }
 
 class RouteTool {

@@ -40,8 +40,7 @@ const RESET_AT_ONCE = 60;
  * @returns {BrowserPart}
  */
 export default function attach(map, options) {
-  const stop = new Stop(map, options);
-  return { destroy: () => stop.destroy() };
+  return new Stop(map, options);
 }
 
 class Stop {
