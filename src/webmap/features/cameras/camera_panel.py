@@ -65,9 +65,9 @@ class CameraPicture:
             type="button",
             class_="camera-small",
             title="Show the camera large or small",
+            # camera_panel.js shows it without a round trip.
+            data_camera_id=str(camera_number(camera)),
         )
-        # camera_panel.js shows it without a round trip.
-        button.set("data-camera-id", str(camera_number(camera)))
         self.element: Element = html.figure(button)
         self._watching = camera.watch(self._show)
         self._show()

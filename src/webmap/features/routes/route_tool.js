@@ -89,7 +89,10 @@ class RouteTool {
     this._loop.title = "Start again after the last point";
     this._here.title = "Add the position of the selected robot";
     this._run = button("webmap-route-run", "Start route", () => this._begin());
-    this._pause = button("webmap-route-pause", "Pause", () => this._pauseOrGoOn());
+    this._pause = button("webmap-route-pause", "Pause", () => {
+      const { run } = this._robots.of(this._map.selected) ?? {};
+      this._do(run?.state === "going" ? "pause" : "go");
+    });
     this._skip = button("webmap-route-skip", "Skip point", () => this._do("skip"));
     this._end = button("webmap-route-end", "End route", () => this._do("end"));
     this._message = html("p", "webmap-route-word", { role: "status" });
@@ -203,11 +206,6 @@ class RouteTool {
     if (selected === null || this._points.length === 0) return;
     this._aim.leave();
     this._robots.begin(selected, [...this._points], { loop: this._loops });
-  }
-
-  _pauseOrGoOn() {
-    const { run } = this._robots.of(this._map.selected) ?? {};
-    this._do(run?.state === "going" ? "pause" : "go");
   }
 
   /** @param {'go' | 'pause' | 'skip' | 'end'} what */

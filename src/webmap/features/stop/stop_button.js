@@ -100,7 +100,10 @@ class Stop {
       drive.on("stop", () => this._stopped()),
       drive.on("robot", (report) => this._report(report)),
       drive.on("goal", (robot) => this._obedience.excuse(robot)),
-      drive.on("gone", (robot) => this._gone(robot)),
+      drive.on("gone", (robot) => {
+        this._obedience.excuse(robot);
+        this._refused.delete(robot);
+      }),
       drive.on("refused", ({ robot, what, why }) => {
         if (what === "reset" && robot !== null) this._refused.set(robot, why);
       }),
@@ -117,12 +120,6 @@ class Stop {
   _report(report) {
     this._obedience.report(report, performance.now());
     if (!isLatched(report)) this._refused.delete(report.robot);
-  }
-
-  /** @param {string} robot */
-  _gone(robot) {
-    this._obedience.excuse(robot);
-    this._refused.delete(robot);
   }
 
   _stopped() {
