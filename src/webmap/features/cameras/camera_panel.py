@@ -209,12 +209,8 @@ def _listed(robot: "Robot | None") -> dict[str, Any]:
 
 def cameras_of(robot: "Robot | None") -> list[Any]:
     """Return the robot's modules that are cameras; none without a robot."""
-    return [] if robot is None else [m for m in robot.modules if is_camera(m)]
-
-
-def is_camera(module: object) -> bool:
-    """Return whether a module has the two names that a panel needs of a camera."""
-    return hasattr(module, "watch") and hasattr(module, "url")
+    modules = [] if robot is None else robot.modules
+    return [m for m in modules if hasattr(m, "watch") and hasattr(m, "url")]
 
 
 def video_of(camera: Any) -> str | None:
