@@ -181,19 +181,12 @@ class CameraPanel:
                 self._show(camera)
 
     def _show(self, camera: Any) -> None:
-        video = video_of(camera)
+        video, about = video_of(camera), {"camera": camera_number(camera)}
         if video is not None:
-            number = camera_number(camera)
-            self.browser_part.send({"op": "video", "camera": number, "url": video})
+            self.browser_part.send({"op": "video", **about, "url": video})
         elif camera.url is not None:
-            self.browser_part.send(
-                {
-                    "op": "picture",
-                    "camera": camera_number(camera),
-                    "url": camera.url,
-                    "stamp": camera.stamp,
-                }
-            )
+            picture = {"url": camera.url, "stamp": camera.stamp}
+            self.browser_part.send({"op": "picture", **about, **picture})
 
 
 def _listed(robot: "Robot | None") -> dict[str, Any]:
