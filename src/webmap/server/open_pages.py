@@ -183,7 +183,9 @@ class PageHost:
             self.close()
             return
         self.lost_at = time.monotonic()
-        self._giving_up = asyncio.get_running_loop().call_later(KEPT_FOR, self.close)
+        self._giving_up = asyncio.get_running_loop().call_later(
+            self._pages.kept_for, self.close
+        )
 
     def tick(self, now: float) -> bool:
         """Send the changes, if the page keeps up; return whether there were some."""
@@ -373,6 +375,11 @@ class OpenPages:
         """The pages to build, by viewer; the viewer whose turn is next comes first."""
         self._closed = 0
         self._drives: dict[tuple[str, str], GateConnection] = {}
+
+    @property
+    def kept_for(self) -> float:
+        """Seconds for which a page is kept whose socket was lost."""
+        return KEPT_FOR
 
     # From the web thread.
 
