@@ -455,7 +455,7 @@ class OpenPages:
         if self._unbuilt:
             asyncio.get_running_loop().call_soon(self._build_next)
         # The objects of a page would make a collection due, which looks at all robots.
-        gc.freeze()
+        self.freeze()
         host.build(sizes)
 
     def built(self) -> None:
@@ -471,6 +471,10 @@ class OpenPages:
             self._closed = 0
             gc.unfreeze()
             gc.collect()
+        self.freeze()
+
+    def freeze(self) -> None:
+        """Except all present objects from collections of garbage."""
         gc.freeze()
 
     def _make_room(self) -> None:
