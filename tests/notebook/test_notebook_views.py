@@ -220,5 +220,5 @@ def test_without_the_extra_the_error_names_it():
 def test_the_objects_of_a_kernel_are_left_to_the_collector(monkeypatch):
     calls = []
     monkeypatch.setattr(gc, "freeze", lambda: calls.append("freeze"))
-    NotebookPages().built()
+    views_module.NotebookPages().built()
     assert calls == []

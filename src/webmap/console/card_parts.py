@@ -2,7 +2,7 @@
 
 import math
 import time
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from webmap import html, svg
 from webmap.base.geometry import Twist
@@ -12,7 +12,6 @@ from webmap.features.doctor.doctor_panel import entry
 
 if TYPE_CHECKING:
     from webmap import Element, Map, Robot
-    from webmap.gate.protocol import GoalReport
 
 COLUMNS = ("Sent", "Arrived", "Measured")
 
@@ -213,6 +212,30 @@ A failed goal is shown until the next goal.
 """
 
 
+class GoalOnCard(Protocol):
+    """The part of a robot's report about its goal that this module needs."""
+
+    @property
+    def state(self) -> str:
+        """A key of ``GOALS``, such as ``"under way"``."""
+
+    @property
+    def left(self) -> float | None:
+        """Remaining distance, in metres."""
+
+    @property
+    def eta(self) -> float | None:
+        """Remaining time, in seconds."""
+
+    @property
+    def time(self) -> float | None:
+        """Time since the goal began, in seconds."""
+
+    @property
+    def recoveries(self) -> int | None:
+        """Number of recoveries that the robot's navigation has run."""
+
+
 class GoalLine:
     """A line of the card: the state of the robot's goal, and the progress."""
 
@@ -242,7 +265,7 @@ class GoalLine:
         self._figures.text = figures(goal)
 
 
-def figures(goal: "GoalReport") -> str:
+def figures(goal: GoalOnCard) -> str:
     """Return the figures of a goal in progress, with units."""
     if goal.state not in ("under way", "cancelling"):
         return ""
