@@ -1,5 +1,6 @@
 """What a widget accepts from a notebook, and when its pages end."""
 
+import gc
 import json
 import subprocess
 import sys
@@ -214,3 +215,10 @@ def test_without_the_extra_the_error_names_it():
         [sys.executable, "-c", WITHOUT], capture_output=True, text=True, check=True
     )
     assert "pip install 'webmap[notebook]'" in done.stdout
+
+
+def test_the_objects_of_a_kernel_are_left_to_the_collector(monkeypatch):
+    calls = []
+    monkeypatch.setattr(gc, "freeze", lambda: calls.append("freeze"))
+    views_module.NotebookPages().built()
+    assert calls == []

@@ -442,7 +442,7 @@ def test_a_handler_sends_a_goal_in_the_name_of_the_page_that_was_clicked(loop):
         bob.move(place, turn, by=pages[0])
     model.drive_opened("page0001", ANN, Drive())
     (page,) = pages
-    press = {"op": "event", "mount": page._mount, "event": "click"}
+    press = {"op": "event", "mount": page.mount, "event": "click"}
     handle.receive(json.dumps({**press, "element": page.element("send").id}))
     loop.call(lambda: True)
     assert [event.page for event in events] == [page]

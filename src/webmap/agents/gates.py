@@ -10,11 +10,12 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from functools import partial
+from typing import Any
 
 from webmap.agents import address
 from webmap.agents.displays import MOST_USERS, Displays, Effect, user_of
 from webmap.agents.gate_messages import AllReports, StopAck, ToDisplays
-from webmap.agents.peer import Peer, peer_of
+from webmap.agents.peer import peer_of
 from webmap.agents.remote_gate import RemoteGate
 from webmap.base.errors import ConfigError, WireError
 from webmap.base.geometry import Twist
@@ -49,23 +50,14 @@ class PageConnection:
         may_drive: Callable[[str], bool] | None = None,
     ) -> None:
         self._gates = gates
-        self._may_drive = may_drive
         self._name = name
-        self._identity = identity
-        self._role: Role = role
         self._send = send
-        self._close = close
+        self._who: dict[str, Any] = {"role": role, "close": close}
+        self._who |= {"identity": identity, "may_drive": may_drive}
         self._speeds: tuple[float, float] | None = None
         self._remote: dict[str, DriveConnection] = {}
         self._greeted = False
-        self._own = gates.own.connect(
-            name,
-            role,
-            self._from_own,
-            close,
-            identity=identity,
-            may_drive=may_drive,
-        )
+        self._own = gates.own.connect(name, send=self._from_own, **self._who)
 
     def receive(self, text: str | bytes) -> None:
         """Pass a frame of the page to the gate of its robot, a STOP for all to all."""
@@ -108,13 +100,7 @@ class PageConnection:
     def join(self, url: str, client: GateClient) -> None:
         """Connect the page to one more gate."""
         connection = client.connect(
-            self._name,
-            self._role,
-            self._from_remote,
-            self._close,
-            self._own.id,
-            self._identity,
-            self._may_drive,
+            self._name, send=self._from_remote, id=self._own.id, **self._who
         )
         self._remote[url] = connection
         if self._speeds is not None:
@@ -305,20 +291,22 @@ class Gates:
         user = peer.user
         display = address.Sender(user.name, user.instance).display
         key = address.gate_in(agent, user.name, user.instance)
-        links: list[RemoteGate] = []
+        put = partial(peer.put_gate, key)
 
         def link(owner: object, lock: "threading.RLock") -> RemoteGate:
             assert isinstance(owner, GateClient)
-            put = partial(peer.put_gate, key)
-            links.append(
-                RemoteGate(agent, display, owner, lock, put, lambda: peer.trouble)
-            )
-            return links[0]
+            made = RemoteGate(agent, display, owner, lock, put, lambda: peer.trouble)
+            self._links[url] = made
+            return made
 
-        client = GateClient(link, agent, f"{display}/")
+        client = self.remote[url] = GateClient(link, agent, f"{display}/")
         client.on_report(self._pass_on)
-        self.remote[url], self._links[url] = client, links[0]
-        self._listen(peer, agent, links[0])
+        remote = self._links[url]
+        peer.listen(
+            address.gate_out(agent),
+            lambda key, sample: remote.take(sample, time.monotonic()),
+            gate=True,
+        )
         for page in self._pages:
             page.join(url, client)
         if self._heartbeat is None:
@@ -326,12 +314,6 @@ class Gates:
                 target=self._beat, name="webmap-agents-heartbeat", daemon=True
             )
             self._heartbeat.start()
-
-    def _listen(self, peer: Peer, agent: str, link: RemoteGate) -> None:
-        def take(_key: str, sample: bytes) -> None:
-            link.take(sample, time.monotonic())
-
-        peer.listen(address.gate_out(agent), take, gate=True)
 
     def _pass_on(self, report: Report) -> None:
         # The loss of one agent does not concern the robots of the others: their

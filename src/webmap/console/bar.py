@@ -49,15 +49,13 @@ class BridgeList:
         self._text = html.span(class_="text")
         self._shown = ""
         self._summary = html.summary(
-            html.span(class_="dot").set("aria-hidden", "true"),
+            html.span(class_="dot", aria_hidden="true"),
             self._text,
             icon("icon-chevron"),
         )
         self._lines: dict[Bridge | str, tuple[Element, Element]] = {}
         self._list = html.ul(class_="bridge-list")
-        element.append(
-            html.details(self._summary, self._list).set("data-webmap-menu", "")
-        )
+        element.append(html.details(self._summary, self._list, data_webmap_menu=""))
         self.poll()
 
     def poll(self) -> None:
@@ -99,11 +97,9 @@ class BridgeList:
         """Add the line of a bridge, or of the router at an address."""
         name, url = (key, key) if isinstance(key, str) else (key.name, key.url)
         word = html.span(class_="word")
-        line = html.li(
-            html.span(class_="dot").set("aria-hidden", "true"),
-            html.span(text=name or url, class_="url"),
-            word,
-        ).set("title", url)
+        dot = html.span(class_="dot", aria_hidden="true")
+        shown = html.span(text=name or url, class_="url")
+        line = html.li(dot, shown, word, title=url)
         if not isinstance(key, str):
             line.append(self._button_of(key))
         self._lines[key] = line, word
@@ -177,11 +173,10 @@ class RefusedList:
         self._newest = html.span(class_="newest")
         self._list = html.ul(class_="bridge-list refused-list")
         summary = html.summary(self._text, self._newest, icon("icon-chevron"))
-        summary.set(
-            "title", "Refused messages from pages. They did not move any robot."
+        summary.set(title="Refused messages from pages. They did not move any robot.")
+        self._details = html.details(
+            summary, self._list, hidden=True, data_webmap_menu=""
         )
-        self._details = html.details(summary, self._list).set(hidden=True)
-        self._details.set("data-webmap-menu", "")
         element.append(self._details)
         self._shown: object = ()
         self.poll()

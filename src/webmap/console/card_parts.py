@@ -67,10 +67,9 @@ class SpeedTable:
         self._reasons = reasons
         self._why.clear()
         for reason in reasons:
-            badge = html.span(text=reason, class_="badge")
-            if "not verified" in reason or "not checked" in reason:
-                badge.set("data-tone", "warn")
-            self._why.append(badge)
+            warns = "not verified" in reason or "not checked" in reason
+            tone = "warn" if warns else None
+            self._why.append(html.span(text=reason, class_="badge", data_tone=tone))
 
     def _table(self) -> "Element":
         head = html.tr(
@@ -125,8 +124,7 @@ class OwnStop:
         self._fastest = fastest
         self._bound = html.span()
         self._how = html.span(class_="minor how")
-        self._test = html.p(class_="test")
-        self._test.set("role", "status")
+        self._test = html.p(class_="test", role="status")
         self.elements: list[Element] = [
             html.dl(
                 html.div(
@@ -243,7 +241,7 @@ class GoalLine:
 
     def __init__(self) -> None:
         self._use = svg.use(href="#goal-sent")
-        shape = svg.svg(self._use, class_="shape").set("aria-hidden", "true")
+        shape = svg.svg(self._use, class_="shape", aria_hidden="true")
         self._words = html.span(text=NO_GOAL)
         self._figures = html.span(class_="minor figures")
         self.element = html.p(
@@ -311,9 +309,12 @@ class RobotHealth:
         self.map = map
         self._list = html.ul()
         self.element: Element = html.section(
-            html.h3(text="Health"), self._list, class_="card-health", hidden=True
+            html.h3(text="Health"),
+            self._list,
+            class_="card-health",
+            aria_label="Health",
+            hidden=True,
         )
-        self.element.set("aria-label", "Health")
         card.append(self.element)
         self._shown: list[tuple[str, str, str]] = []
         self.on_select()

@@ -85,8 +85,7 @@ class RobotCard:
         self._name = html.h2(dir="auto")
         self._words = StateWords(html.p())
         self._reason = html.p(class_="minor reason")
-        self._problems = html.p(class_="problems")
-        self._problems.set("role", "alert")
+        self._problems = html.p(class_="problems", role="alert")
         self._x, self._y, self._heading = html.span(), html.span(), html.span()
         self._age = html.dd(class_="age")
         self._age.set_age(math.inf, limit=AGE_LIMIT, age_text=True)
@@ -194,16 +193,13 @@ class RobotCard:
         self._robot = self._feed = None
 
     def _parts(self) -> "list[Element]":
+        quiet = {"type": "button", "class_": "button square quiet"}
         close = html.button(
-            icon("icon-close"), type="button", class_="button square quiet"
+            icon("icon-close"), aria_label="Deselect the robot", **quiet
         )
-        close.set("aria-label", "Deselect the robot")
         close.on("click", lambda event: self.map.set_selected(None), role="viewer")
-        follow = html.button(
-            icon("icon-follow"), type="button", class_="button square quiet"
-        )
-        follow.set("data-act", "follow").set("title", "Keep the robot in the middle")
-        follow.set("aria-label", "Follow")
+        follow = html.button(icon("icon-follow"), data_act="follow", **quiet)
+        follow.set(title="Keep the robot in the middle", aria_label="Follow")
         head = html.div(
             *self._shape.elements, self._name, follow, close, class_="card-head"
         )
@@ -217,8 +213,8 @@ class RobotCard:
         buttons["cancel"].on("click", lambda event: self._forget_goal())
         buttons["remove"].on("click", lambda event: self._remove_robot())
         buttons["remove"].set(
-            "title",
-            "No data comes from this robot. The robot is shown again when data comes.",
+            title="No data comes from this robot. The robot is shown again when data "
+            "comes."
         )
         self.notes.append(self._problems)
         self.more.append(
@@ -293,21 +289,25 @@ def fact(name: str, value: "Element", unit: str) -> "Element":
 
 def action(act: str, symbol: str, words: str) -> "Element":
     """Return a button whose presses console.js handles."""
-    element = html.button(icon(symbol), words, type="button", class_="button")
-    return element.set("data-act", act)
+    return html.button(
+        icon(symbol), words, type="button", class_="button", data_act=act
+    )
 
 
 def stop_test() -> "Element":
     """Return the button that takes control, and then runs the stop test."""
     words = [html.span(text=text, class_=name) for name, text in TEST_WORDS]
-    element = html.button(
-        icon("icon-test"), *words, type="button", class_="button", disabled=True
+    return html.button(
+        icon("icon-test"),
+        *words,
+        type="button",
+        class_="button",
+        disabled=True,
+        title="Moves the robot slowly, ends the commands and measures when the robot "
+        "stops",
+        data_act="stop-test",
+        data_test="take",
     )
-    element.set(
-        "title",
-        "Moves the robot slowly, ends the commands and measures when the robot stops",
-    )
-    return element.set("data-act", "stop-test").set("data-test", "take")
 
 
 class RobotButtons:
@@ -320,8 +320,7 @@ class RobotButtons:
 
     def __init__(self, map: "Map", card: "Element") -> None:
         self.map = map
-        self.element: Element = html.section(class_="card-buttons")
-        self.element.set("aria-label", "Buttons")
+        self.element = html.section(class_="card-buttons", aria_label="Buttons")
         card.append(self.element)
         self._shown: list[Any] = []
         self.on_select()

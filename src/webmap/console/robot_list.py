@@ -33,8 +33,8 @@ class BatteryMark:
             self._fill,
             svg.rect(x=23.5, y=4, width=2, height=5, rx=1, class_="solid"),
             viewBox="0 0 26 13",
+            aria_hidden="true",
         )
-        picture.set("aria-hidden", "true")
         name = html.span(text="battery ", class_="unseen")
         self.element = html.span(
             picture, name, self._text, class_="minor battery", hidden=True
@@ -128,20 +128,21 @@ class Row:
             self._battery.element,
             self._age,
             type="button",
+            aria_pressed="false",
         )
-        self._button.set("aria-pressed", "false")
         self._button.on("click", lambda event: map.pick(robot, event), role="viewer")
-        self._besides = html.input(type="checkbox")
-        self._besides.set("aria-label", f"Also select {robot.name}")
-        self._besides.set("title", "Also select this robot for goals")
+        self._besides = html.input(
+            type="checkbox",
+            aria_label=f"Also select {robot.name}",
+            title="Also select this robot for goals",
+        )
         self._besides.on(
             "change",
             lambda event: map.set_marked(robot, bool(event.checked)),
             role="viewer",
         )
         label = html.label(self._besides, class_="besides")
-        self.element = html.li(self._button, label, class_="row")
-        self.element.set("data-robot", robot.id)
+        self.element = html.li(self._button, label, class_="row", data_robot=robot.id)
         self._age.set_age(math.inf, limit=AGE_LIMIT, age_text=True)
         self.element.set_age(math.inf, limit=AGE_LIMIT)
         self._shown: tuple[object, ...] | None = None
@@ -237,11 +238,11 @@ class StateShape:
 
     def __init__(self) -> None:
         self._use = svg.use(href="#state-waiting")
-        now = svg.svg(self._use, class_="shape now")
-        old = svg.svg(svg.use(href="#state-old"), class_="shape old")
-        self.elements = (now, old)
-        for element in self.elements:
-            element.set("aria-hidden", "true")
+        old = svg.use(href="#state-old")
+        self.elements = (
+            svg.svg(self._use, class_="shape now", aria_hidden="true"),
+            svg.svg(old, class_="shape old", aria_hidden="true"),
+        )
 
     def show(self, shape: str) -> None:
         """Show a symbol of console.html."""

@@ -86,7 +86,7 @@ NEED_A_PERSON = (
 
 def icon(symbol: str) -> Element:
     """Return a symbol of console.html as a decorative picture."""
-    return svg.svg(svg.use(href=f"#{symbol}"), class_="icon").set("aria-hidden", "true")
+    return svg.svg(svg.use(href=f"#{symbol}"), class_="icon", aria_hidden="true")
 
 
 def look_of(robot: "Robot") -> Look:
@@ -296,8 +296,7 @@ class StateMark:
         held = shown.activity == "held" and shown.conditions
         words = shown.conditions_text if held else shown.text
         self._words.text = words if needs_person(robot) else ""
-        robot.svg.set("data-tone", look.tone or None)
-        robot.svg.set("data-group", look.group)
+        robot.svg.set(data_tone=look.tone or None, data_group=look.group)
         title = robot.svg.children[0]
         assert isinstance(title, Element), "a robot's group begins with its title"
         title.text = f"{robot.name}: {shown.text}"

@@ -106,7 +106,8 @@ class BasePage:
         self._sizes = dict(sizes)
         self._document = Document()
         self.fragment = Fragment(self._document)
-        self._mount = channel.mount(self.fragment, under=0)
+        self.mount = channel.mount(self.fragment, under=0)
+        """The mount of the page's own elements."""
         _pages[self.fragment.id] = self
         self.on_speeds: Callable[[float, float], None] | None = None
         self.on_move: Callable[[str, float, float, float], None] | None = None
@@ -128,11 +129,6 @@ class BasePage:
         if isinstance(container, BoundElement):
             return self._sizes.get(container.html_id, (0.0, 0.0))
         return (0.0, 0.0)
-
-    @property
-    def mount(self) -> int:
-        """The mount of the page's own elements."""
-        return self._mount
 
     def on_close(self, fn: Callable[[], object]) -> Removal:
         """Call ``fn`` when the page is closed permanently."""
@@ -315,7 +311,7 @@ class BasePage:
         self.scope.close()
         for mount in {mount for mount, _, _ in self._listening}:
             self.forget_mount(mount)
-        self.channel.unmount(self._mount)
+        self.channel.unmount(self.mount)
 
 
 def _flags(listeners: Sequence[Listener]) -> tuple[bool, bool] | None:

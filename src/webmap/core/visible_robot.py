@@ -93,8 +93,7 @@ class VisibleRobot(MovableRobot):
         self.pose_source = PoseSource(self, self.show_pose)
         """The source of its poses, on its own map and on the common one."""
         self.svg = svg.g(svg.title(text=self.name), self.model, class_="robot unplaced")
-        self.svg.set("data-name", self.name)
-        self.svg.set("data-robot", self.motion.id)
+        self.svg.set(data_name=self.name, data_robot=self.motion.id)
         self.fragment = Fragment(self.svg)
         self.model_images = ModelImages(self.svg)
         robots[self.id] = self
@@ -431,15 +430,14 @@ class VisibleRobot(MovableRobot):
         if shown is not None and shown[1:3] == state[1:3] == ("gone", ()):
             return  # since the same time, however it is rounded
         self._state_shown = state
-        self.svg.set("data-state", state.name)
-        since = since_when(self.silent_for) if state.name == "gone" else None
-        self.svg.set("data-since", since)
-        activity = None if state.activity == state.name else state.activity
-        self.svg.set("data-activity", activity)
-        self.svg.set("data-conditions", " ".join(state.conditions) or None)
         is_moved = "other" in (state.activity, *state.conditions)
-        program = named(self.motion.writers) if is_moved else None
-        self.svg.set("data-program", program)
+        self.svg.set(
+            data_state=state.name,
+            data_since=since_when(self.silent_for) if state.name == "gone" else None,
+            data_activity=None if state.activity == state.name else state.activity,
+            data_conditions=" ".join(state.conditions) or None,
+            data_program=named(self.motion.writers) if is_moved else None,
+        )
         self.notify_modules("on_state", state)
 
     def _needs_poses(self) -> bool:

@@ -180,8 +180,7 @@ class WorldView(Extendable):
         self.world.append(self.images)
         self.world.tf = initial_view(self._rect.width, self._rect.height)
         self.root: Element = svg.svg(self.world, class_="webmap", tabindex=0)
-        self.root.set("role", "application")
-        self.root.set("aria-label", "Map")
+        self.root.set(role="application", aria_label="Map")
         self.root.set_map(self.world, canvas_width or 0.0, canvas_height or 0.0)
         self.fragment = Fragment(self.root)
         self._parts: dict[int, BrowserPart] = {}

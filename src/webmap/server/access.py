@@ -313,7 +313,7 @@ class AccessControl:
         if request.changes:
             text = SESSION_ENDED if self._settings.people else NOT_SIGNED_IN
             return self._key_holder(request) or AccessRefusal(401, text)
-        viewer = self._cookie_holder(request)
+        viewer = self._first(map(self._token.session, request.cookie(_name(request))))
         if not request.reads:
             return viewer or AccessRefusal(401, "Sign in first.")
         sessions = [self.codes.use(code, now) for code in request.codes()]
@@ -396,9 +396,6 @@ class AccessControl:
         return request.origin in self._settings.origins or same_origin(
             request.origin, secure=request.secure, host=request.host
         )
-
-    def _cookie_holder(self, request: RequestHead) -> Viewer | None:
-        return self._first(map(self._token.session, request.cookie(_name(request))))
 
     def _key_holder(self, request: RequestHead) -> Viewer | None:
         token = self._token

@@ -145,9 +145,9 @@ class WebApp:
             RouteFor("viewer", "/_webmap/key", _key_fits, methods=["POST"]),
             RouteFor("viewer", "/_webmap/sign-out", self._sign_out, methods=["POST"]),
             RouteFor("viewer", "/_webmap/shift-log.csv", _shift_log, methods=["POST"]),
-            RouteFor("viewer", FILES + "{name:path}", self._published_file),
-            RouteFor("viewer", IMAGES + "{tag}", self._published_image),
-            RouteFor("viewer", "/_webmap/{name:path}", self._static),
+            self._files(FILES + "{name:path}", self.published.file),
+            self._files(IMAGES + "{tag}", self.published.image),
+            self._files("/_webmap/{name:path}", own_files.file),
             RouteFor("viewer", HEALTH, self._healthz),
             RouteFor("admin", METRICS, self._metrics),
             RouteFor("viewer", "/{path:path}", PageAnswers(site, self._gzip)),
@@ -219,17 +219,12 @@ class WebApp:
         text, media_type = rendered(found, len(pages), pages.viewers, accept)
         return Response(text, headers={"content-type": media_type})
 
-    async def _static(self, request: Request) -> Response:
-        name = request.path_params["name"]
-        return await answer_file(request, self._gzip, lambda: own_files.file(name))
+    def _files(self, path: str, read: Callable[[str], File]) -> RouteFor:
+        async def answer(request: Request) -> Response:
+            (name,) = request.path_params.values()
+            return await answer_file(request, self._gzip, lambda: read(name))
 
-    async def _published_file(self, request: Request) -> Response:
-        name = request.path_params["name"]
-        return await answer_file(request, self._gzip, lambda: self.published.file(name))
-
-    async def _published_image(self, request: Request) -> Response:
-        tag = request.path_params["tag"]
-        return await answer_file(request, self._gzip, lambda: self.published.image(tag))
+        return RouteFor("viewer", path, answer)
 
 
 async def _key_fits(request: Request) -> Response:
@@ -330,7 +325,7 @@ class PageAnswers:
     async def _answer(self, request: Request, path: str) -> Response:
         entry = find_page(self._site, path)
         if entry is not None:
-            return await self._page(request, entry)
+            return await asyncio.to_thread(self._page, request, entry)
         entry = find_page(self._site, other_spelling(path))
         if entry is not None:
             return RedirectResponse(relative("/" + path, entry.path), 308)
@@ -338,10 +333,7 @@ class PageAnswers:
             request, self._gzip, lambda: self._folder_file("/" + path)
         )
 
-    async def _page(self, request: Request, entry: PageEntry) -> Response:
-        return await asyncio.to_thread(self._page_now, request, entry)
-
-    def _page_now(self, request: Request, entry: PageEntry) -> Response:
+    def _page(self, request: Request, entry: PageEntry) -> Response:
         files = f"{base_from(entry.path)}v-{own_files.version()}/"
         key, marks = request.scope.get(PAGE_KEY), request.scope.get(MARKS, ())
         if entry.html is None:
@@ -369,7 +361,8 @@ class PageAnswers:
 
     def _folder_file(self, path: str) -> File:
         # Longest first: the files of the nearest page come first.
-        for entry in sorted(self._site.pages.values(), key=_depth, reverse=True):
+        pages = self._site.pages.values()
+        for entry in sorted(pages, key=lambda each: -each.path.count("/")):
             name = name_in_folder(entry, path)
             if name is None or entry.folder is None:
                 continue
@@ -384,10 +377,6 @@ class PageAnswers:
             self._warned[html] = blocked
             for sentence in blocked:
                 log.warning("%s, %s", html, sentence)
-
-
-def _depth(entry: PageEntry) -> int:
-    return entry.path.count("/")
 
 
 def other_spelling(path: str) -> str:

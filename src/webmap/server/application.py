@@ -167,19 +167,10 @@ def run(
             certificate cannot be used.
 
     """
+    options = {**locals(), **command_line}
     global has_run
     has_run = True
-    options: dict[str, Any] = {"host": host, "port": port}
-    options |= {"open_browser": open_browser, "insecure_lan": insecure_lan}
-    options |= {"tls": tls, "tls_cert": tls_cert, "tls_key": tls_key}
-    options |= {"public_url": public_url, "trusted_proxies": trusted_proxies}
-    options |= {"proxy_user_header": proxy_user_header, "proxy_roles": proxy_roles}
-    options |= {"proxy_groups_header": proxy_groups_header}
-    options |= {"sign_out_url": sign_out_url}
-    options |= {"embed_from": embed_from, "embed_driving": embed_driving}
-    options |= command_line
-    runtime.frame_rate = _checked_rate(frame_rate)
-    _serve(token=token, max_pages=_checked_pages(max_pages), **options)
+    _serve(**options)
 
 
 def _checked_pages(number: int) -> int:
@@ -213,6 +204,7 @@ def _serve(
     embed_driving: bool,
     token: str | None,
     max_pages: int,
+    frame_rate: float,
 ) -> None:
     from webmap.base.tls import Renewal, tls_files
     from webmap.gate.locks import state_folder
@@ -229,6 +221,7 @@ def _serve(
     )
 
     # Check everything that can be refused before anything starts.
+    runtime.frame_rate = _checked_rate(frame_rate)
     find = tls_files(host, state_folder() / "tls", tls, tls_cert, tls_key)
     certificate = find and Renewal(find)
     check_exposure(host, tls=certificate is not None, insecure_lan=insecure_lan)
@@ -237,7 +230,7 @@ def _serve(
         "hosts": Hosts.of_binding(host, proxies.names),
         "origins": frozenset(filter(None, [proxies.origin])),
         "proxies": proxies,
-        "max_pages": max_pages,
+        "max_pages": _checked_pages(max_pages),
         "embed_from": frozenset(map(checked_origin, embed_from)),
         "embed_driving": embed_driving,
     }

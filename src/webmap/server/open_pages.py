@@ -18,6 +18,7 @@ from webmap.base.geometry import Affine
 from webmap.base.scope import Removal
 from webmap.base.tasks import begin
 from webmap.core.base_page import PageEntry
+from webmap.core.map import Map
 from webmap.core.operators import Viewer
 from webmap.core.page import Page
 from webmap.core.pictures import Publisher
@@ -164,9 +165,11 @@ class PageHost:
             case ViewReport():
                 self._view_report(event)
             case ModuleReady(instance=instance):
-                self._module_ready(instance)
+                for map in self._maps:
+                    map.on_module_ready(instance)
             case ModuleMessage(instance=instance, data=data):
-                self._module_message(instance, data)
+                for map in self._maps:
+                    map.on_module_message(instance, data)
             case Trouble(text=text):
                 log.warning("%r: the page reports: %s", self, text)
 
@@ -218,18 +221,14 @@ class PageHost:
 
     def _view_report(self, report: ViewReport) -> None:
         r = report
-        for map in self._page.maps if self._page else ():
+        for map in self._maps:
             if map.root.id == r.map_element:
                 tf = Affine(r.a, r.b, r.c, r.d, r.e, r.f)
                 map.on_view_report(tf, Rect(r.left, r.top, r.width, r.height))
 
-    def _module_ready(self, instance: int) -> None:
-        for map in self._page.maps if self._page else ():
-            map.on_module_ready(instance)
-
-    def _module_message(self, instance: int, message: dict[str, Any]) -> None:
-        for map in self._page.maps if self._page else ():
-            map.on_module_message(instance, message)
+    @property
+    def _maps(self) -> list[Map]:
+        return self._page.maps if self._page else []
 
     def _element_event(self, report: ElementEvent) -> None:
         page, element = self._page, self._session.element(report.mount, report.element)

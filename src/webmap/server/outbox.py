@@ -10,6 +10,7 @@ import weakref
 from collections import deque
 from collections.abc import Callable
 from functools import partial
+from typing import ClassVar
 
 from webmap.core.pictures import KEY, MOST_PACKET_BYTES, MOST_PACKETS
 
@@ -33,21 +34,25 @@ class FrameQueue:
     single waiting frame may have any size: the first one holds the whole scene.
     """
 
+    most: ClassVar = FRAMES
+    most_bytes: ClassVar = FRAME_BYTES
+
     def __init__(self) -> None:
         self._waiting: deque[bytes | str] = deque()
         self._size = 0
 
     def put(self, item: bytes | str) -> bool:
-        """Add a frame; return False if the queue is full."""
+        """Add an item; return False if the queue is full."""
         size = self._size + len(item)
-        if self._waiting and (len(self._waiting) >= FRAMES or size > FRAME_BYTES):
+        full = len(self._waiting) >= self.most or size > self.most_bytes
+        if self._waiting and full:
             return False
         self._waiting.append(item)
         self._size = size
         return True
 
     def pop(self) -> bytes | str | None:
-        """Return the oldest frame; None if the queue is empty."""
+        """Return the oldest item; None if the queue is empty."""
         if not self._waiting:
             return None
         item = self._waiting.popleft()
@@ -55,40 +60,29 @@ class FrameQueue:
         return item
 
 
-class DriveQueue:
+class DriveQueue(FrameQueue):
     """Messages of the gate: the newest tick before all others, which are in order.
 
     A newer tick replaces a waiting one. The gate's reports and refusals are never left
     out.
     """
 
-    def __init__(self) -> None:
-        self._tick: bytes | str | None = None
-        self._waiting: deque[bytes | str] = deque()
-        self._size = 0
+    most = MESSAGES
+    most_bytes = MESSAGE_BYTES
+
+    _tick: str | None = None
 
     def put(self, item: bytes | str) -> bool:
         """Add a message; return False if the queue is full."""
         if isinstance(item, str) and item.startswith(_TICK):
             self._tick = item
             return True
-        size = self._size + len(item)
-        if len(self._waiting) >= MESSAGES or size > MESSAGE_BYTES:
-            return False
-        self._waiting.append(item)
-        self._size = size
-        return True
+        return super().put(item)
 
     def pop(self) -> bytes | str | None:
         """Return the waiting tick, otherwise the oldest message, otherwise None."""
-        if self._tick is not None:
-            item, self._tick = self._tick, None
-            return item
-        if not self._waiting:
-            return None
-        item = self._waiting.popleft()
-        self._size -= len(item)
-        return item
+        tick, self._tick = self._tick, None
+        return super().pop() if tick is None else tick
 
 
 class VideoQueue:

@@ -89,26 +89,35 @@ def place_of(socket: WebSocket) -> str:
     return "" if proxied else "WebMap's computer"
 
 
-class SceneSockets:
+class PageSockets:
+    """The sockets of one kind of one application.
+
+    Args:
+        calls: Calls functions in the loop of the sockets.
+        limit: The greatest number of open sockets.
+
+    """
+
+    def __init__(self, calls: BatchedCallsByLoop, limit: int) -> None:
+        self._calls = calls
+        self.open = OpenSockets(limit)
+        """Those that are open."""
+
+    def end_unless(self, lasts: Callable[[str], object]) -> None:
+        """Close the sockets of the viewers whose session has ended."""
+        self.open.end_unless(lasts, SIGNED_OUT)
+
+
+class SceneSockets(PageSockets):
     """The ``/_webmap/scene`` sockets of one application."""
 
     def __init__(
         self, site: Site, pages: OpenPages, calls: BatchedCallsByLoop, limit: int
     ) -> None:
+        super().__init__(calls, limit)
         self._site = site
         self._pages = pages
-        self._calls = calls
-        self._open = OpenSockets(limit)
         self._opens = Opens(limit)
-
-    @property
-    def open(self) -> OpenSockets:
-        """The sockets of open pages."""
-        return self._open
-
-    def end_unless(self, lasts: Callable[[str], object]) -> None:
-        """Close the sockets of the viewers whose session has ended."""
-        self._open.end_unless(lasts, SIGNED_OUT)
 
     async def serve(self, socket: WebSocket) -> None:
         """Serve one socket until it ends."""
@@ -129,7 +138,7 @@ class SceneSockets:
         if not self._opens.may_open(viewer.id, time.monotonic()):
             await page_socket.refuse(COME_BACK, TOO_SOON)
             return
-        async with self._open.holding((viewer.id, page_id), page_socket) as has_room:
+        async with self.open.holding((viewer.id, page_id), page_socket) as has_room:
             if has_room:
                 hello = socket.query_params.get("hello")
                 with operators.present(viewer, place_of(socket)):
@@ -169,16 +178,11 @@ MOST_VIDEOS = 8
 VIDEO_OVER = "this video has ended"
 
 
-class VideoSockets:
+class VideoSockets(PageSockets):
     """The ``/_webmap/video/TAG`` sockets of one application."""
 
     def __init__(self, calls: BatchedCallsByLoop, limit: int) -> None:
-        self._calls = calls
-        self._open = OpenSockets(MOST_VIDEOS * limit)
-
-    def end_unless(self, lasts: Callable[[str], object]) -> None:
-        """Close the sockets of the viewers whose session has ended."""
-        self._open.end_unless(lasts, SIGNED_OUT)
+        super().__init__(calls, MOST_VIDEOS * limit)
 
     async def serve(self, socket: WebSocket) -> None:
         """Serve one socket until it ends."""
@@ -197,7 +201,7 @@ class VideoSockets:
             page_socket.go_on()
 
         key = (viewer.id, secrets.token_hex(8))
-        async with self._open.holding(key, page_socket) as has_room:
+        async with self.open.holding(key, page_socket) as has_room:
             if not has_room:
                 await page_socket.refuse(COME_BACK, "too many open videos")
                 return
@@ -236,7 +240,7 @@ MOST_LAST_STOPS = 60
 second."""
 
 
-class DriveSockets:
+class DriveSockets(PageSockets):
     """The ``/_webmap/drive`` sockets of one application."""
 
     def __init__(
@@ -246,15 +250,14 @@ class DriveSockets:
         calls: BatchedCallsByLoop,
         limit: int,
     ) -> None:
+        super().__init__(calls, limit)
         self._pages = pages
         self._connect_to_gate = connect_to_gate
-        self._calls = calls
-        self._open = OpenSockets(limit)
         self._stop_only = OpenSockets(MOST_STOP_ONLY, always=True)
 
     def end_unless(self, lasts: Callable[[str], object]) -> None:
         """Close the sockets of the viewers whose session has ended: robots stop."""
-        self._open.end_unless(lasts, SIGNED_OUT)
+        super().end_unless(lasts)
         self._stop_only.end_unless(lasts, SIGNED_OUT)
 
     async def serve(self, socket: WebSocket) -> None:
@@ -273,7 +276,7 @@ class DriveSockets:
         )
         key = (viewer.id, page_id)
         place = place_of(socket)
-        async with self._open.holding(key, page_socket) as has_room:
+        async with self.open.holding(key, page_socket) as has_room:
             if has_room:
                 with operators.present(viewer, place):
                     await self._carry(page_socket, page_id, viewer, limited=named)
@@ -282,7 +285,7 @@ class DriveSockets:
             async with self._stop_only.holding(key, page_socket):
                 with operators.present(viewer, place):
                     await self._carry(page_socket, page_id, viewer, stops_only=True)
-        elif not self._open.full:
+        elif not self.open.full:
             self._stop_only.end_oldest("there is a place now: connect again")
 
     async def _carry(

@@ -304,10 +304,6 @@ class GraphNode:
         self.graph.subscribe(self, topic, callback, type_name, node=NODE)
 
 
-Make = Callable[[int, str, float], Message | None]
-"""Makes a robot's message from its index, the topic's name and the stamp."""
-
-
 @dataclass(frozen=True, slots=True)
 class Feed:
     """A topic that every robot has, in its own namespace."""
@@ -319,5 +315,10 @@ class Feed:
     period: float
     """Seconds between two messages."""
 
-    make: Make
-    """Called only while the topic has subscribers; None if there is no message."""
+    frame: str
+    """The frame of the header: ``map``, or a frame of each robot without its prefix;
+    empty if the type has no header."""
+
+    make: Callable[[int], Message | None]
+    """Makes the message of the robot with this index, without its header; None if there
+    is none. Called only while the topic has subscribers."""

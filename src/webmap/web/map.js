@@ -267,17 +267,11 @@ export class MapCanvas {
   operate(number, operation, args) {
     if (!this._operations.reach(number)) return;
     this._reports.note();
-    this._operations.whenSized(this._sized, () => this._operate(operation, args));
-  }
-
-  /**
-   * @param {string} operation
-   * @param {number[]} args
-   */
-  _operate(operation, args) {
-    const { view, follow } = operated(this._view, this, operation, args);
-    if (follow !== undefined) this.follow(follow);
-    if (view !== undefined) this._program(view);
+    this._operations.whenSized(this._sized, () => {
+      const { view, follow } = operated(this._view, this, operation, args);
+      if (follow !== undefined) this.follow(follow);
+      if (view !== undefined) this._program(view);
+    });
   }
 
   /** @param {Matrix} view */

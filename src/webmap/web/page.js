@@ -80,7 +80,11 @@ export class Page {
     dark.addEventListener("change", () => this.scene.restyle());
     /** @type {import('./link.js').LinkEvents} */
     const events = {
-      opened: () => this._opened(),
+      opened: () => {
+        this._listening = performance.now();
+        this._frames.clear();
+        this._isNew = true;
+      },
       received: (data, at) => this._received(data, at),
       closed: (reason, forGood) => this._closed(reason, forGood),
       refused: () => void this._askWhy(),
@@ -135,12 +139,6 @@ export class Page {
   }
 
   // The connection -------------------------------------------------------------
-
-  _opened() {
-    this._listening = performance.now();
-    this._frames.clear();
-    this._isNew = true;
-  }
 
   /**
    * @param {ArrayBuffer} data

@@ -268,19 +268,9 @@ export class Scene {
    * @param {number} id
    * @param {number} element
    * @param {string} kind
-   * @param {number} flags
-   */
-  listen(id, element, kind, flags) {
-    this._listen(id, element, kind, flags);
-  }
-
-  /**
-   * @param {number} id
-   * @param {number} element
-   * @param {string} kind
    */
   unlisten(id, element, kind) {
-    this._listen(id, element, kind, undefined);
+    this.listen(id, element, kind, undefined);
   }
 
   /**
@@ -289,7 +279,7 @@ export class Scene {
    * @param {string} kind
    * @param {number | undefined} flags undefined to stop listening.
    */
-  _listen(id, element, kind, flags) {
+  listen(id, element, kind, flags) {
     const mount = this._mounts.get(id);
     if (!mount) return;
     // Kept separately, for a new element with the same id.

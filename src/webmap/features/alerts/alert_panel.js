@@ -55,11 +55,7 @@ const pace = new Pace();
  * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
-  const panel = new AlertPanel(map, options, send);
-  return {
-    receive: (message) => panel.receive(message),
-    destroy: () => panel.destroy(),
-  };
+  return new AlertPanel(map, options, send);
 }
 
 /**

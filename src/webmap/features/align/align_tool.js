@@ -55,11 +55,7 @@ const ARROWS = {
  * @returns {BrowserPart}
  */
 export default function attach(map, _options, send) {
-  const tool = new AlignTool(map, send);
-  return {
-    receive: (message) => tool.receive(message),
-    destroy: () => tool.destroy(),
-  };
+  return new AlignTool(map, send);
 }
 
 class AlignTool {

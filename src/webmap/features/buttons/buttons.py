@@ -49,20 +49,16 @@ class ButtonView:
         self._press = html.button(text=spec.label, type="button", class_="button go")
         self._press.on("click", self._pressed)
         self._age = html.span(class_="since")
-        self._progress = html.progress()
-        self._progress.set("aria-label", f"{spec.label}: running")
+        self._progress = html.progress(aria_label=f"{spec.label}: running")
         self._running = html.span(
             self._progress, self._age, class_="webmap-row minor running"
         )
-        self._result = html.p(class_="minor result")
-        self._result.set("role", "status")
+        self._result = html.p(class_="minor result", role="status")
         self._question = html.div(class_="question", hidden=True)
         self._sheet = html.div(class_="sheet", hidden=True)
         self._head = html.div(self._press, self._running, class_="webmap-row head")
-        self.element: Element = html.div(
-            self._head, self._question, self._sheet, self._result, class_="robot-button"
-        )
-        self.element.set("data-label", spec.label)
+        parts = (self._head, self._question, self._sheet, self._result)
+        self.element = html.div(*parts, class_="robot-button", data_label=spec.label)
         parent.append(self.element)
         button.on_change(self.refresh)
         self.refresh()
@@ -255,8 +251,7 @@ class FormView:
         if field.is_array:
             kind = "input"
         control.on(kind, lambda event: self._changed(field, path, event))
-        error = html.small(class_="wrong")
-        error.set("role", "alert")
+        error = html.small(class_="wrong", role="alert")
         self._inputs[path], self._errors[path] = control, error
         name = html.span(text=field.name, class_="name")
         hint = html.small(text=_hint(field), class_="minor hint")
@@ -371,9 +366,8 @@ class Buttons:
             too.
         """
         scope = Scope(f"buttons of {self.robot.name}", self._failed)
-        holder = html.div(class_="robot-buttons")
-        holder.set("role", "group")
-        holder.set("aria-label", f"Buttons of {self.robot.name}")
+        name = f"Buttons of {self.robot.name}"
+        holder = html.div(class_="robot-buttons", role="group", aria_label=name)
         element.append(holder)
         with scope.active():
             keep(Removal(holder.remove))

@@ -43,11 +43,7 @@ const PERIOD = 100;
  * @param {(message: Record<string, unknown>) => void} send
  */
 export default function attach(map, _options, send) {
-  const panel = new CameraPanel(map, send);
-  return {
-    receive: (/** @type {Message} */ message) => panel.receive(message),
-    destroy: () => panel.destroy(),
-  };
+  return new CameraPanel(map, send);
 }
 
 class CameraPanel {

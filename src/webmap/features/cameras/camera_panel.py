@@ -65,9 +65,9 @@ class CameraPicture:
             type="button",
             class_="camera-small",
             title="Show the camera large or small",
+            # camera_panel.js shows it without a round trip.
+            data_camera_id=str(camera_number(camera)),
         )
-        # camera_panel.js shows it without a round trip.
-        button.set("data-camera-id", str(camera_number(camera)))
         self.element: Element = html.figure(button)
         self._watching = camera.watch(self._show)
         self._show()
@@ -181,19 +181,12 @@ class CameraPanel:
                 self._show(camera)
 
     def _show(self, camera: Any) -> None:
-        video = video_of(camera)
+        video, about = video_of(camera), {"camera": camera_number(camera)}
         if video is not None:
-            number = camera_number(camera)
-            self.browser_part.send({"op": "video", "camera": number, "url": video})
+            self.browser_part.send({"op": "video", **about, "url": video})
         elif camera.url is not None:
-            self.browser_part.send(
-                {
-                    "op": "picture",
-                    "camera": camera_number(camera),
-                    "url": camera.url,
-                    "stamp": camera.stamp,
-                }
-            )
+            picture = {"url": camera.url, "stamp": camera.stamp}
+            self.browser_part.send({"op": "picture", **about, **picture})
 
 
 def _listed(robot: "Robot | None") -> dict[str, Any]:
@@ -209,12 +202,8 @@ def _listed(robot: "Robot | None") -> dict[str, Any]:
 
 def cameras_of(robot: "Robot | None") -> list[Any]:
     """Return the robot's modules that are cameras; none without a robot."""
-    return [] if robot is None else [m for m in robot.modules if is_camera(m)]
-
-
-def is_camera(module: object) -> bool:
-    """Return whether a module has the two names that a panel needs of a camera."""
-    return hasattr(module, "watch") and hasattr(module, "url")
+    modules = [] if robot is None else robot.modules
+    return [m for m in modules if hasattr(m, "watch") and hasattr(m, "url")]
 
 
 def video_of(camera: Any) -> str | None:

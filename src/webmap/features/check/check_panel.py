@@ -49,10 +49,11 @@ class CheckPanel:
         """The checks of this page that run or were just made, by robot."""
         self._shown: object = None
         self._places = (urgent, folded)
-        self._status = html.p(class_="minor").set("role", "status")
+        self._status = html.p(class_="minor", role="status")
         self._list = html.ul()
-        self._button = html.button("Check before driving", type="button")
-        self._button.set("class", "button").set("data-act", "check")
+        self._button = html.button(
+            "Check before driving", type="button", class_="button", data_act="check"
+        )
         self._button.on("click", lambda event: self._begin())
         self.element: Element = html.section(
             html.h3(text="Check before driving"),
@@ -60,8 +61,8 @@ class CheckPanel:
             self._list,
             html.div(self._button, class_="webmap-row wraps"),
             class_="card-health card-check",
+            aria_label="Check before driving",
         )
-        self.element.set("aria-label", "Check before driving")
         self._place: Element | None = None
         self.browser_part = map.add_browser_part(
             self, "features/check/check_panel.js", {}

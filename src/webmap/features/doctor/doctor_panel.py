@@ -80,9 +80,13 @@ class Report:
         self._shown = -1
         name = bridge.name or bridge.url
         where = f"doctor-{next(_numbers)}"
-        self.opener: Element = html.button("Check", type="button", class_="button")
-        self.opener.set("popovertarget", where)
-        self.opener.set("aria-label", f"Check {name} for problems with driving")
+        self.opener: Element = html.button(
+            "Check",
+            type="button",
+            class_="button",
+            popovertarget=where,
+            aria_label=f"Check {name} for problems with driving",
+        )
         self.opener.on("click", lambda event: self._opened(), role="viewer")
         close = html.button(_close_icon(), type="button", class_="button square quiet")
         close.set("popovertarget", where).set("aria-label", "Close the report")
@@ -92,17 +96,16 @@ class Report:
         self._checked = html.span("Checked ", self._age, " ago. ", hidden=True)
         self._again = html.button("Check again", type="button", class_="button")
         self._again.on("click", lambda event: self._start())
-        copy = html.button(
+        self._copy = html.button(
             html.span(text="Copy as text", class_="before"),
             html.span(text="Copied", class_="after"),
             type="button",
             class_="button copy",
+            data_copy="doctor",
         )
-        self._copy = copy.set("data-copy", "doctor")
         self._list = html.div(class_="findings")
         self._text = html.pre(class_="as-text", tabindex="0")
-        status = html.p(self._checked, self._doing, class_="status")
-        status.set("role", "status")
+        status = html.p(self._checked, self._doing, class_="status", role="status")
         self.element: Element = html.section(
             html.div(html.h2(text=f"Check of {name}"), close, class_="doctor-head"),
             status,
@@ -118,8 +121,8 @@ class Report:
             class_="doctor webmap-surface",
             id=where,
             popover="auto",
+            aria_label=f"Check of {name}",
         )
-        self.element.set("aria-label", f"Check of {name}")
         self.poll()
 
     def poll(self) -> None:
@@ -171,9 +174,7 @@ def line(finding: "Finding") -> "Element":
 
 
 def _close_icon() -> "Element":
-    return svg.svg(svg.use(href="#icon-close"), class_="icon").set(
-        "aria-hidden", "true"
-    )
+    return svg.svg(svg.use(href="#icon-close"), class_="icon", aria_hidden="true")
 
 
 def entry(level: str, word: str, words: str, advice: str = "") -> "Element":
@@ -367,9 +368,8 @@ class TryCall:
         self._checkup = checkup
         self._may = role in MAY_TRY
         self.button: Element = html.button(
-            "Test for delays", type="button", class_="button"
+            "Test for delays", type="button", class_="button", hidden=not self._may
         )
-        self.button.set(hidden=not self._may)
         self.button.on("click", lambda event: self._ask(True))
         self._yes = html.button("Run test", type="button", class_="button")
         self._yes.on("click", lambda event: self._agreed())
@@ -380,9 +380,9 @@ class TryCall:
             html.div(self._yes, no, class_="webmap-row wraps doctor-answers"),
             class_="webmap-muted doctor-question",
             role="group",
+            aria_label="Test for delays",
             hidden=True,
         )
-        self.question.set("aria-label", "Test for delays")
         self.poll()
 
     def poll(self) -> None:

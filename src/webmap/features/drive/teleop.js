@@ -44,8 +44,7 @@ const NOT_YOURS = "You may look and press STOP. The robot's own operators can dr
  * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
-  const teleop = new Teleop(map, options, send);
-  return { destroy: () => teleop.destroy() };
+  return new Teleop(map, options, send);
 }
 
 /** Instead of the keys that drive, after a driving key without its position. */
@@ -69,7 +68,10 @@ class Teleop {
       stop: () => this._stop(),
       lease: () => this._lease(),
       reset: (stops) => this._reset(stops),
-      stick: () => this._toggleStick(),
+      stick: () => {
+        this._stick.wanted = !this._stick.wanted;
+        this._show();
+      },
       test: () => this._test(),
     });
     this._stick = new StickPad(this._drive);
@@ -161,11 +163,6 @@ class Teleop {
     if (report?.mine) this._drive.release(robot);
     else if (report && heldByAnother(report)) this._drive.ask(robot);
     else this._drive.take(robot);
-    this._show();
-  }
-
-  _toggleStick() {
-    this._stick.wanted = !this._stick.wanted;
     this._show();
   }
 

@@ -17,8 +17,7 @@ import { joinSaveMenu, offer } from "../../web/tools/save_menu.js";
  * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
-  const tool = new ExportTool(map, options, send);
-  return { destroy: () => tool.destroy() };
+  return new ExportTool(map, options, send);
 }
 
 class ExportTool {

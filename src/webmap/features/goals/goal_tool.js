@@ -36,11 +36,7 @@ import { showNote, tool, toolName } from "../../web/tools/tool.js";
  * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
-  const attached = new GoalTool(map, options, send);
-  return {
-    receive: (message) => attached.receive(message),
-    destroy: () => attached.destroy(),
-  };
+  return new GoalTool(map, options, send);
 }
 
 class GoalTool {
@@ -77,7 +73,9 @@ class GoalTool {
     this._go = button("webmap-aim-go webmap-goal-go", "", () => this._toggle());
     this._go.append(...toolName("goal", "Send goal"));
     this._go.title = `Send goal (${key.toUpperCase()})`;
-    this._cancel = button("webmap-goal-cancel", "Cancel goal", () => this._callOff());
+    this._cancel = button("webmap-goal-cancel", "Cancel goal", () => {
+      for (const robot of chosen(map)) this._cancelOne(robot);
+    });
     this._message = html("span", "webmap-muted webmap-aim-word webmap-goal-word", { role: "status" });
     this._spacing = html("input", "webmap-goal-spacing-value", {
       type: "number",
@@ -256,10 +254,6 @@ class GoalTool {
     showNote(this._message, `Goal not sent: ${problems.join("; ")}`, this._drive, refused);
   }
 
-  _callOff() {
-    for (const robot of chosen(this._map)) this._cancelOne(robot);
-  }
-
   /** @param {string} robot */
   _cancelOne(robot) {
     if (!this._runs(robot)) return;
@@ -394,7 +388,8 @@ class Marking {
       svg.addEventListener(end, () => this._up(), { signal });
     }
     // The browser's own menu would end the press.
-    svg.addEventListener("contextmenu", (event) => this._noMenu(event), { signal });
+    const noMenu = (/** @type {MouseEvent} */ event) => robotAt(event) && event.preventDefault();
+    svg.addEventListener("contextmenu", noMenu, { signal });
   }
 
   destroy() {
@@ -426,11 +421,6 @@ class Marking {
   _move(event) {
     const { x, y } = this._from;
     if (Math.hypot(event.clientX - x, event.clientY - y) > STILL) clearTimeout(this._timer);
-  }
-
-  /** @param {MouseEvent} event */
-  _noMenu(event) {
-    if (robotAt(event) !== null) event.preventDefault();
   }
 }
 

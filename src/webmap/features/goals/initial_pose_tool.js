@@ -34,11 +34,7 @@ const OUTLINE = "M-14-11H8l9 11-9 11h-22zM17 0h26M43 0l-9-6M43 0l-9 6";
  * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
-  const attached = new InitialPoseTool(map, options, send);
-  return {
-    receive: (message) => attached.receive(message),
-    destroy: () => attached.destroy(),
-  };
+  return new InitialPoseTool(map, options, send);
 }
 
 class InitialPoseTool {

@@ -214,19 +214,18 @@ class IncidentButton:
         self.map = map
         self._incidents = incidents
         self._may = map.page.viewer.role != "viewer"
-        self._button = html.button("Keep the last minutes", type="button")
-        self._button.set("class", "button").set("data-act", "keep-minutes")
-        self._button.set(
-            "title",
-            "Keeps a recording of all robots: the last ten minutes and the next ten "
-            "seconds. Open it with webmap play.",
+        self._button = html.button(
+            "Keep the last minutes",
+            type="button",
+            class_="button",
+            data_act="keep-minutes",
+            title="Keeps a recording of all robots: the last ten minutes and the next "
+            "ten seconds. Open it with webmap play.",
         )
         self._button.on("click", lambda event: self._keep())
-        self._text = html.p(class_="webmap-muted minor").set("role", "status")
-        self.element: Element = html.section(
-            html.div(self._button, class_="webmap-row wraps"), self._text
-        )
-        self.element.set("aria-label", "Recording")
+        self._text = html.p(class_="webmap-muted minor", role="status")
+        buttons = html.div(self._button, class_="webmap-row wraps")
+        self.element = html.section(buttons, self._text, aria_label="Recording")
         element.append(self.element)
         self.poll()
 

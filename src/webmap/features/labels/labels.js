@@ -25,11 +25,7 @@ import { claimPresses, showNote, tool, toolName } from "../../web/tools/tool.js"
  * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
-  const labels = new Labels(map, options, send);
-  return {
-    receive: (message) => labels.receive(message),
-    destroy: () => labels.destroy(),
-  };
+  return new Labels(map, options, send);
 }
 
 class Labels {
@@ -93,7 +89,8 @@ class Labels {
     root.addEventListener("click", (event) => this._clicked(event), first);
     root.addEventListener("keydown", (event) => this._pressed(event), first);
     window.addEventListener("keydown", (event) => this._keyDown(event), { signal });
-    this._panel.addEventListener("keydown", (event) => this._inPanel(event), { signal });
+    const leave = (/** @type {KeyboardEvent} */ { key }) => key === "Escape" && this._leave();
+    this._panel.addEventListener("keydown", leave, { signal });
   }
 
   /** @param {KeyboardEvent} event */
@@ -103,11 +100,6 @@ class Labels {
     const { active } = devicesOf(this._map.drive);
     if (!this._editable || (active !== null && active.map !== this._map)) return;
     this._activate(!this._active);
-  }
-
-  /** @param {KeyboardEvent} event */
-  _inPanel(event) {
-    if (event.key === "Escape") this._leave();
   }
 
   /** @param {KeyboardEvent} event Enter, on a label that has the focus. */

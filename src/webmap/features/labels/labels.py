@@ -110,10 +110,10 @@ class LabelLayer(Layer):
         upright = svg.g(svg.circle(r=14, class_="spot"), icon, name, class_="upright")
         title = svg.title(text=label.name)
         drawn = svg.g(title, upright, class_=f"label {label.icon} {label.kind}".strip())
-        drawn.set("data-label", label.id).set("data-name", label.name)
-        drawn.set("data-kept", "true" if label.kept else None)
-        drawn.set("data-yaw", None if label.yaw is None else f"{label.yaw:.6f}")
-        drawn.set("tabindex", 0).set("role", "button").set("aria-label", label.name)
+        kept, yaw = "true" if label.kept else None, label.yaw
+        drawn.set(data_label=label.id, data_name=label.name, data_kept=kept)
+        drawn.set(data_yaw=None if yaw is None else f"{yaw:.6f}")
+        drawn.set(tabindex=0, role="button", aria_label=label.name)
         drawn.set_pose(label.x, label.y, 0.0)
         self._drawn[label.id] = drawn
         self.svg.append(drawn)

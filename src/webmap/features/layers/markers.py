@@ -323,8 +323,7 @@ class Markers(MapLayer):
     def _draw(
         self, key: Key, before: Element | None, shape: Element, marker: MarkerMsg
     ) -> None:
-        shape.set("data-ns", marker.ns)
-        shape.set("data-id", str(marker.id))
+        shape.set(data_ns=marker.ns, data_id=str(marker.id))
         if before is None:
             self.svg.append(shape)
         else:

@@ -6,7 +6,7 @@ import time
 import weakref
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from webmap.base.errors import ConfigError
@@ -302,16 +302,9 @@ class RosoutPanel:
             if (log.version, state) == (version, sent_state):
                 continue
             self._sent[bridge] = (log.version, state)
+            # All fields but the version.
             lines = [
-                [
-                    line.number,
-                    line.level,
-                    line.name,
-                    line.text,
-                    line.count,
-                    line.received_at,
-                ]
-                for line in log.since(version)[-self._lines :]
+                list(astuple(line)[:-1]) for line in log.since(version)[-self._lines :]
             ]
             self.browser_part.send(
                 {

@@ -45,11 +45,7 @@ const LOOKS = /** @type {Record<string, [string, string, string]>} */ ({
  * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
-  const panel = new RosoutPanel(map, options, send);
-  return {
-    receive: (message) => panel.receive(message),
-    destroy: () => panel.destroy(),
-  };
+  return new RosoutPanel(map, options, send);
 }
 
 /**

@@ -22,8 +22,7 @@ import { claimPresses, tool, toolName } from "../../web/tools/tool.js";
  * @returns {BrowserPart}
  */
 export default function attach(map, options) {
-  const attached = new MeasureTool(map, options);
-  return { destroy: () => attached.destroy() };
+  return new MeasureTool(map, options);
 }
 
 /**

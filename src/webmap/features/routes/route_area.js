@@ -65,7 +65,10 @@ export class RouteArea {
       begin: () => this._begin(),
       close: () => this._close(),
       undo: () => this._set(this._corners.slice(0, -1)),
-      here: () => this._addHere(),
+      here: () => {
+        const pose = route.here();
+        if (pose) this._add(pose);
+      },
       changed: () => this._show(),
       take: () => this._take(),
       leave: () => this.leave(),
@@ -178,11 +181,6 @@ export class RouteArea {
     if (last > 0 && this._near(pose, 0, NEAR)) this._close();
     else if (this._near(pose, last, TWICE)) this._show();
     else this._add(pose);
-  }
-
-  _addHere() {
-    const pose = this._route.here();
-    if (pose) this._add(pose);
   }
 
   /** @param {Point} corner */

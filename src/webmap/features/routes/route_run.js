@@ -275,7 +275,8 @@ export class RouteRobots {
   /** @param {string} robot @param {'go' | 'pause' | 'skip' | 'end'} what */
   act(robot, what) {
     const going = this._going.get(robot);
-    if (going) this._perform(robot, going, going.run[what](this._goalOf(robot)));
+    const goal = this._drive.robots.get(robot)?.goal?.id ?? null;
+    if (going) this._perform(robot, going, going.run[what](goal));
   }
 
   /** Update the positions of the robots. */
@@ -366,11 +367,6 @@ export class RouteRobots {
     const shown = { ...report, mine: this._drive.holds(robot) };
     const now = performance.now();
     this._perform(robot, going, going.order ? run.waits(shown) : run.report(shown, away, now));
-  }
-
-  /** @param {string} robot */
-  _goalOf(robot) {
-    return this._drive.robots.get(robot)?.goal?.id ?? null;
   }
 }
 

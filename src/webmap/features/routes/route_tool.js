@@ -30,11 +30,7 @@ const TOO_SHORT = `A loop needs at least ${LEAST_LOOP} points.`;
  * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
-  const tool = new RouteTool(map, options, send);
-  return {
-    receive: (message) => tool.receive(message),
-    destroy: () => tool.destroy(),
-  };
+  return new RouteTool(map, options, send);
 }
 
 class RouteTool {
@@ -93,7 +89,10 @@ class RouteTool {
     this._loop.title = "Start again after the last point";
     this._here.title = "Add the position of the selected robot";
     this._run = button("webmap-route-run", "Start route", () => this._begin());
-    this._pause = button("webmap-route-pause", "Pause", () => this._pauseOrGoOn());
+    this._pause = button("webmap-route-pause", "Pause", () => {
+      const { run } = this._robots.of(this._map.selected) ?? {};
+      this._do(run?.state === "going" ? "pause" : "go");
+    });
     this._skip = button("webmap-route-skip", "Skip point", () => this._do("skip"));
     this._end = button("webmap-route-end", "End route", () => this._do("end"));
     this._message = html("p", "webmap-route-word", { role: "status" });
@@ -207,11 +206,6 @@ class RouteTool {
     if (selected === null || this._points.length === 0) return;
     this._aim.leave();
     this._robots.begin(selected, [...this._points], { loop: this._loops });
-  }
-
-  _pauseOrGoOn() {
-    const { run } = this._robots.of(this._map.selected) ?? {};
-    this._do(run?.state === "going" ? "pause" : "go");
   }
 
   /** @param {'go' | 'pause' | 'skip' | 'end'} what */

@@ -60,10 +60,9 @@ class HandOver:
         self._alerts = alerts
         self._sheet = page.element("sheet")
         self._period = page.element("period")
-        choice = html.select()
+        choice = html.select(aria_label="Period")
         for value, text in PERIODS.items():
             choice.append(html.option(text=text, value=value))
-        choice.set("aria-label", "Period")
         choice.on("change", self._choose, role="viewer")
         self._period.append(choice)
         self.show("shift")

@@ -42,11 +42,7 @@ const kept = { open: false, since: "shift", robot: "", person: "", kind: "" };
  * @returns {BrowserPart}
  */
 export default function attach(map, options, send) {
-  const panel = new ShiftPanel(map, options, send);
-  return {
-    receive: (message) => panel.receive(message),
-    destroy: () => panel.destroy(),
-  };
+  return new ShiftPanel(map, options, send);
 }
 
 class ShiftPanel {

@@ -40,8 +40,7 @@ const RESET_AT_ONCE = 60;
  * @returns {BrowserPart}
  */
 export default function attach(map, options) {
-  const stop = new Stop(map, options);
-  return { destroy: () => stop.destroy() };
+  return new Stop(map, options);
 }
 
 class Stop {
@@ -101,7 +100,10 @@ class Stop {
       drive.on("stop", () => this._stopped()),
       drive.on("robot", (report) => this._report(report)),
       drive.on("goal", (robot) => this._obedience.excuse(robot)),
-      drive.on("gone", (robot) => this._gone(robot)),
+      drive.on("gone", (robot) => {
+        this._obedience.excuse(robot);
+        this._refused.delete(robot);
+      }),
       drive.on("refused", ({ robot, what, why }) => {
         if (what === "reset" && robot !== null) this._refused.set(robot, why);
       }),
@@ -118,12 +120,6 @@ class Stop {
   _report(report) {
     this._obedience.report(report, performance.now());
     if (!isLatched(report)) this._refused.delete(report.robot);
-  }
-
-  /** @param {string} robot */
-  _gone(robot) {
-    this._obedience.excuse(robot);
-    this._refused.delete(robot);
   }
 
   _stopped() {

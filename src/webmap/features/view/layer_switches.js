@@ -40,8 +40,7 @@ let maps = 0;
  * @returns {BrowserPart}
  */
 export default function attach(map, options) {
-  const switches = new LayerSwitches(map, options);
-  return { destroy: () => switches.destroy() };
+  return new LayerSwitches(map, options);
 }
 
 /**

@@ -23,8 +23,7 @@ const KEY_ANGLE = Math.PI / 24;
  * @returns {BrowserPart}
  */
 export default function attach(map, options) {
-  const control = new MouseViewControl(map, options);
-  return { destroy: () => control.destroy() };
+  return new MouseViewControl(map, options);
 }
 
 class MouseViewControl {

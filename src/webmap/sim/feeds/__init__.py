@@ -57,14 +57,19 @@ class Feeds:
             steps: Number of steps of the world so far.
 
         """
-        graph = self._node.graph
+        graph, dialect = self._node.graph, self._node.messages.dialect
         for feed in self._feeds:
             if not self._is_due(steps, feed.period):
                 continue
             for index, robot in enumerate(self._node.world.robots):
                 topic = f"{robot.topics}/{feed.topic}"
                 if graph.is_wanted(topic):
-                    message = feed.make(index, topic, graph.clock())
+                    message = feed.make(index)
+                    if message is not None and feed.frame:
+                        prefix = "" if feed.frame == "map" else robot.frames
+                        frame = f"{prefix}{feed.frame}"
+                        header = dialect.header(topic, graph.clock(), frame)
+                        message = {"header": header, **message}
                     if message is not None:
                         self._node.publish(topic, message)
         if self._is_due(steps, 0.2):

@@ -105,9 +105,10 @@ class Localizations:
         self._beliefs = [Belief() for _ in node.world.robots]
         self._random = np.random.default_rng(node.world.options.seed)
         with_covariance = "geometry_msgs/PoseWithCovarianceStamped"
+        poses = "geometry_msgs/PoseArray"
         self.feeds = (
-            Feed("amcl_pose", with_covariance, 0.5, self._make_pose),
-            Feed("particlecloud", "geometry_msgs/PoseArray", 1.0, self._make_cloud),
+            Feed("amcl_pose", with_covariance, 0.5, "map", self._make_pose),
+            Feed("particlecloud", poses, 1.0, "map", self._make_cloud),
         )
 
     def start(self) -> None:
@@ -142,21 +143,15 @@ class Localizations:
             self._node.world.robots[index].pose, given, (x, y, yaw)
         )
 
-    def _make_pose(self, index: int, topic: str, stamp: float) -> Message:
+    def _make_pose(self, index: int) -> Message:
         believed = self.believed(index)
         covariance = self._beliefs[index].covariance(believed.yaw)
-        return {
-            "header": self._node.messages.dialect.header(topic, stamp, "map"),
-            "pose": {"pose": pose(believed), "covariance": covariance},
-        }
+        return {"pose": {"pose": pose(believed), "covariance": covariance}}
 
-    def _make_cloud(self, index: int, topic: str, stamp: float) -> Message:
+    def _make_cloud(self, index: int) -> Message:
         belief = self._beliefs[index]
         places = belief.particles(self.believed(index), self._random)
-        return {
-            "header": self._node.messages.dialect.header(topic, stamp, "map"),
-            "poses": [pose(Pose(*place)) for place in places],
-        }
+        return {"poses": [pose(Pose(*place)) for place in places]}
 
 
 class Satellites:
@@ -164,18 +159,15 @@ class Satellites:
 
     def __init__(self, node: GraphNode) -> None:
         self._node = node
-        self.feed = Feed("fix", "sensor_msgs/NavSatFix", 0.5, self._make)
+        self.feed = Feed("fix", "sensor_msgs/NavSatFix", 0.5, "base_link", self._make)
 
-    def _make(self, index: int, topic: str, stamp: float) -> Message:
+    def _make(self, index: int) -> Message:
         robot = self._node.world.robots[index]
         latitude, longitude = on_the_globe(robot.pose.x, robot.pose.y)
         covariance = [0.0] * 9
         covariance[0] = covariance[4] = DEVIATION**2
         covariance[8] = (2 * DEVIATION) ** 2
         return {
-            "header": self._node.messages.dialect.header(
-                topic, stamp, f"{robot.frames}base_link"
-            ),
             "status": {"status": _AUGMENTED, "service": _GPS},
             "latitude": latitude,
             "longitude": longitude,

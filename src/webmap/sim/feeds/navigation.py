@@ -300,14 +300,14 @@ class Footprints:
             if node.messages.dialect.is_ros2
             else "move_base/local_costmap/footprint"
         )
-        self.feed = Feed(name, "geometry_msgs/PolygonStamped", 0.2, self._make)
+        type = "geometry_msgs/PolygonStamped"
+        self.feed = Feed(name, type, 0.2, "odom", self._make)
 
-    def _make(self, index: int, topic: str, stamp: float) -> Message:
+    def _make(self, index: int) -> Message:
         robot = self._node.world.robots[index]
-        header = self._node.messages.dialect.header(topic, stamp, f"{robot.frames}odom")
         corners = outline(robot.odometry, robot.options.radius)
         points = [{"x": float32(x), "y": float32(y), "z": 0.0} for x, y in corners]
-        return {"header": header, "polygon": {"points": points}}
+        return {"polygon": {"points": points}}
 
 
 def outline(at: Pose, radius: float) -> list[tuple[float, float]]:
@@ -324,18 +324,13 @@ class Lookaheads:
 
     def __init__(self, node: GraphNode) -> None:
         self._node = node
-        self.feed = Feed(
-            "lookahead_point", "geometry_msgs/PointStamped", 0.2, self._make
-        )
+        type = "geometry_msgs/PointStamped"
+        self.feed = Feed("lookahead_point", type, 0.2, "base_link", self._make)
 
-    def _make(self, index: int, topic: str, stamp: float) -> Message | None:
+    def _make(self, index: int) -> Message | None:
         world = self._node.world
         robot, ahead = world.robots[index], world.navigators[index].steers_to
         if ahead is None:
             return None
-        dialect = self._node.messages.dialect
         at = robot.pose.inverse @ Pose(*ahead)
-        return {
-            "header": dialect.header(topic, stamp, f"{robot.frames}base_link"),
-            "point": vector(at.x, at.y),
-        }
+        return {"point": vector(at.x, at.y)}

@@ -207,10 +207,13 @@ class MarkerFeed:
 
     def __init__(self, node: GraphNode) -> None:
         self._node = node
-        self.feed = Feed("markers", "visualization_msgs/MarkerArray", 0.2, self._make)
+        type = "visualization_msgs/MarkerArray"
+        self.feed = Feed("markers", type, 0.2, "", self._make)
 
-    def _make(self, index: int, topic: str, stamp: float) -> Message:
-        header = self._node.messages.dialect.header(topic, stamp, "map")
+    def _make(self, index: int) -> Message:
+        node = self._node
+        topic = f"{node.world.robots[index].topics}/{self.feed.topic}"
+        header = node.messages.dialect.header(topic, node.graph.clock(), "map")
         marks = [*self._goal(index), *self._seen(index)]
         return {"markers": [{"header": header, **mark} for mark in marks]}
 

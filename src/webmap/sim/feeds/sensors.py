@@ -44,34 +44,24 @@ class Clouds:
 
     def __init__(self, node: GraphNode) -> None:
         self._node = node
-        self.feed = Feed("points", "sensor_msgs/PointCloud2", 0.2, self._make)
+        type = "sensor_msgs/PointCloud2"
+        self.feed = Feed("points", type, 0.2, "base_laser", self._make)
 
-    def _make(self, index: int, topic: str, stamp: float) -> Message:
+    def _make(self, index: int) -> Message:
         world = self._node.world
-        robot = world.robots[index]
         whole = world.sweep([index])[0]
-        walls = world.scanner.sweep([robot.pose])[0]
+        walls = world.scanner.sweep([world.robots[index].pose])[0]
         points = cloud_points(whole, walls)
         if self._node.tilted:
             points["y"] *= -1
             points["z"] *= -1
-        dialect = self._node.messages.dialect
-        return cloud_message(
-            dialect.header(topic, stamp, f"{robot.frames}base_laser"), points
-        )
+        return cloud_message(points)
 
 
-def cloud_message(header: Message, points: NDArray[np.void]) -> Message:
-    """Return ``sensor_msgs/PointCloud2`` of points with named fields.
-
-    Args:
-        header: Its header.
-        points: The points, of shape (N,).
-
-    """
+def cloud_message(points: NDArray[np.void]) -> Message:
+    """Return ``sensor_msgs/PointCloud2`` of points with named fields, of shape (N,)."""
     layout = points.dtype
     return {
-        "header": header,
         "height": 1,
         "width": len(points),
         "fields": [
@@ -156,18 +146,15 @@ class DepthClouds:
     def __init__(self, node: GraphNode) -> None:
         self._node = node
         self._rays = ScannerRays(node.world.obstacles, _BEARINGS, _CAMERA_MOST)
-        self.feed = Feed("camera/points", "sensor_msgs/PointCloud2", 0.2, self._make)
+        type = "sensor_msgs/PointCloud2"
+        self.feed = Feed("camera/points", type, 0.2, CAMERA_FRAME, self._make)
 
-    def _make(self, index: int, topic: str, stamp: float) -> Message:
-        robot = self._node.world.robots[index]
+    def _make(self, index: int) -> Message:
         seen = seen_from(CAMERA_POSE, self.points(index))
         points = np.zeros(len(seen), CAMERA_POINT)
         for number, axis in enumerate("xyz"):
             points[axis] = seen[:, number]
-        dialect = self._node.messages.dialect
-        return cloud_message(
-            dialect.header(topic, stamp, f"{robot.frames}{CAMERA_FRAME}"), points
-        )
+        return cloud_message(points)
 
     def points(self, index: int) -> NDArray[np.float64]:
         """Return the points in view, in the frame of the robot's base: (N, 3)."""
@@ -218,7 +205,7 @@ class Sonars:
         self._node = node
         bearings = np.linspace(-_SONAR_FIELD / 2, _SONAR_FIELD / 2, _SONAR_RAYS)
         self._rays = ScannerRays(node.world.obstacles, bearings, _SONAR_FARTHEST)
-        self.feed = Feed("sonar", "sensor_msgs/Range", 0.2, self._make)
+        self.feed = Feed("sonar", "sensor_msgs/Range", 0.2, SONAR_FRAME, self._make)
 
     def distance(self, index: int) -> float:
         """Return the distance to the nearest obstacle in the cone; inf if none."""
@@ -232,12 +219,8 @@ class Sonars:
             return math.inf
         return nearest if nearest >= _SONAR_NEAREST else -math.inf
 
-    def _make(self, index: int, topic: str, stamp: float) -> Message:
-        robot = self._node.world.robots[index]
+    def _make(self, index: int) -> Message:
         return {
-            "header": self._node.messages.dialect.header(
-                topic, stamp, f"{robot.frames}{SONAR_FRAME}"
-            ),
             "radiation_type": _ULTRASOUND,
             "field_of_view": float32(_SONAR_FIELD),
             "min_range": float32(_SONAR_NEAREST),
