@@ -274,7 +274,7 @@ def report_error(
 
     """
     text = f"{name}: the bridge reports an error: {one_line(message)}"
-    log.warning("%s", text)
+    log.warning("%s", text, extra={"source": name})
     report(BridgeError(text))
 
 
