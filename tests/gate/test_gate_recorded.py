@@ -4,10 +4,10 @@ import json
 import random
 import time
 
-import msgspec
 import pytest
 from gate_page import Page
 
+from equipment.declarations import changed
 from equipment.waiting import wait_for
 from webmap.gate.display.client import GateClient
 from webmap.gate.rules.motion import DEADMAN
@@ -36,7 +36,7 @@ def driven(client: GateClient, robot_spec, witness):
 
     def declare(kind=Recorder, **changes):
         client.declare(
-            msgspec.structs.replace(
+            changed(
                 robot_spec,
                 bridge_url=witness.url,
                 v_max=V_MAX,

@@ -11,11 +11,12 @@ import json
 import sys
 import threading
 
-from equipment.declarations import declared
 from webmap.agents.gates import Gates
 from webmap.agents.peer import close_peers
 from webmap.base.errors import NoLease
 from webmap.base.geometry import Twist
+from webmap.config.motion import TwistConfig
+from webmap.gate.protocol import RobotSpec
 
 ROBOT = sys.argv[2] if len(sys.argv) > 2 else "r1"
 
@@ -109,17 +110,19 @@ def main() -> None:
     """Follow the orders on standard input until it ends."""
     client = Gates()
     client.start()
-    spec = declared(
+    spec = RobotSpec(
         id=ROBOT,
         name="Bob",
-        bridge_url=sys.argv[1],
-        twist_topic="/cmd_vel",
-        stops_within=0.5,
-        v_max=1.0,
-        w_max=1.5,
+        twist=TwistConfig(
+            bridge=sys.argv[1],
+            topic="/cmd_vel",
+            stops_within=0.5,
+            v_max=1.0,
+            w_max=1.5,
+            drive_without_proof=True,
+        ),
         odometry_topic="/odom",
         odometry_type="nav_msgs/Odometry",
-        drive_without_proof=True,
     )
     client.declare(spec)
     operator, ended = Operator(client), threading.Event()
