@@ -167,6 +167,7 @@ def run(
             certificate cannot be used.
 
     """
+    # All arguments; those of the command line come before them.
     options = {**locals(), **command_line}
     global has_run
     has_run = True
