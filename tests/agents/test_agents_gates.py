@@ -37,7 +37,7 @@ def spec(robot, url):
         name=robot,
         bridge_url=url,
         twist_topic="/cmd_vel",
-        stops_within=0.0,
+        stops_within=1e-9,
         v_max=1.0,
         w_max=1.5,
     )

@@ -21,7 +21,8 @@ def test_a_robot_and_its_topics_take_few_calls():
         return robot
 
     made = [make(f"robot_{number}") for number in range(3)]
-    gc.disable()  # objects of other tests may call something when they are deleted
+    gc.collect()  # robots of other tests also do something for a new one
+    gc.disable()
     sys.setprofile(count)
     try:
         made.append(make("counted"))

@@ -40,6 +40,7 @@ PARSERS = {
     "agents.camera_messages:read_reply": (),
     "agents.camera_messages:read_request": (),
     "agents.data_messages:lean_scan": (5,),
+    "agents.data_messages:read_json": (msgspec.json.decode, "text"),
     "agents.data_messages:read_op": (),
     "agents.data_messages:unpack": (),
     "bags.types:bytes_of_json": ("FIELDS", {"ros2": True}),
@@ -204,7 +205,7 @@ def parsed(name, data):
     rest = [named(one) for one in given if one is not options]
     if name in ("fleet.robot_files:picture_from_agent",):
         rest, data_at = [*rest, data], 1
-    elif name.startswith(("fleet.robot_files", "bags.types")):
+    elif name.startswith(("fleet.robot_files", "bags.types")) or "read_json" in name:
         rest, data_at = [rest[0], data, *rest[1:]], 1
     else:
         rest, data_at = [data, *rest], 0
