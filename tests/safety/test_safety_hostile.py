@@ -23,7 +23,8 @@ def check(bench, strict=FULL):
 
     If ``strict``, one trial decides. Otherwise a disturbed trial does not count if
     other processes or the host took the processors during the trial. After one
-    disturbed trial that counts, the next two that count must be undisturbed.
+    disturbed trial that counts, the next two that count must be undisturbed. The test
+    is skipped if no trial counts; STOP is checked in each of them.
     """
     trials, owed, allowed = [], 1, not strict
     while owed and len(trials) < TRIALS:
@@ -36,7 +37,9 @@ def check(bench, strict=FULL):
         elif strict or not contended(driven):
             assert allowed, f"disturbed: {trials}"
             owed, allowed = 2, False
-    assert not owed, f"disturbed too often: {trials}"
+    assert allowed or not owed, f"disturbed too often: {trials}"
+    if owed:
+        pytest.skip(f"other processes took the processors in {TRIALS} trials: {trials}")
 
 
 def undisturbed(driven):
