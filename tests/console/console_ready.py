@@ -1,7 +1,11 @@
 """Wait until a page of the console is ready, and steps that several tests share."""
 
 import re
+import signal
+from collections.abc import Callable
+from contextlib import suppress
 
+import psutil
 from playwright.sync_api import Locator, Page, expect
 
 from equipment.waiting import wait_for
@@ -18,6 +22,23 @@ READY = """async () => {
 def wait_until_ready(page: Page) -> None:
     """Wait until the page has loaded all its modules and style sheets."""
     wait_for(lambda: page.evaluate(READY), "all modules of the page", 30.0, page)
+
+
+def halt_robots(process: psutil.Process, page: Page, lost: Callable[[], None]) -> None:
+    """Halt a simulator until each robot has an alert; ``lost`` asserts this.
+
+    A halted bridge answers no ping. If the bridge is lost before the poses of its
+    robots are old, all of them have one alert: then it is halted once more.
+    """
+    for _ in range(4):
+        process.send_signal(signal.SIGSTOP)
+        with suppress(AssertionError):
+            lost()
+            return
+        process.send_signal(signal.SIGCONT)
+        page.wait_for_timeout(5000)
+    process.send_signal(signal.SIGSTOP)
+    lost()
 
 
 def count_presses(page: Page) -> None:

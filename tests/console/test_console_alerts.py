@@ -4,6 +4,7 @@ import re
 import signal
 
 import pytest
+from console_ready import halt_robots
 from playwright.sync_api import Page, expect
 
 from equipment.waiting import wait_for
@@ -32,7 +33,11 @@ def test_two_viewers_share_the_alerts_of_lost_robots(demo, open_console, halt):
     expect(new(ann)).to_have_count(0)
     expect(ann.locator(".webmap-alert-badge")).to_be_hidden()
 
-    halt.send_signal(signal.SIGSTOP)
+    def lost() -> None:
+        each = new(ann).filter(has_text=LOST)
+        expect(each).to_have_count(demo.robots, timeout=SOON)
+
+    halt_robots(halt, ann, lost)
     for page in (ann, bob):
         expect(new(page).filter(has_text=LOST)).to_have_count(demo.robots, timeout=SOON)
         expect(page.locator(".webmap-alert-badge")).to_have_text(re.compile(r"\d"))

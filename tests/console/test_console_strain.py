@@ -5,7 +5,7 @@ import signal
 from pathlib import Path
 
 import pytest
-from console_ready import assert_free, select, wait_until_ready
+from console_ready import assert_free, halt_robots, select, wait_until_ready
 from playwright.sync_api import Page, expect
 
 from equipment.chromium import end_stops, watched_tab
@@ -157,12 +157,14 @@ def test_all_robots_in_trouble_leave_the_map_and_the_stop_buttons_free(
 ):
     page = open_console()
     corner = page.locator(STOP_ALL).evaluate(CORNER)
-    halt.send_signal(signal.SIGSTOP)
-    expect(page.locator(".chip").first).to_have_text(f"{ROBOTS} lost", timeout=30_000)
     # Some seconds after their poses, the connection for commands ends too, and that of
     # the bridge, which is one more alert.
     some = "|".join(str(n) for n in range(ROBOTS, 2 * ROBOTS + 2))
-    expect(page.locator(".webmap-alert-badge")).to_have_text(re.compile(f"^({some})$"))
+    badge = page.locator(".webmap-alert-badge")
+    halt_robots(
+        halt, page, lambda: expect(badge).to_have_text(re.compile(f"^({some})$"))
+    )
+    expect(page.locator(".chip").first).to_have_text(f"{ROBOTS} lost", timeout=30_000)
     page.locator(STOP_ALL).click()
     page.locator(".webmap-alerts > summary").click()
     alerts = page.locator("[aria-label='New alerts'] > li")

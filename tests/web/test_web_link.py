@@ -132,7 +132,8 @@ def test_style_sheets_that_load_together_are_read_once(host, tab, opened):
           const { scene } = page;
           let times = 0;
           scene.restyle = () => (times += 1);
-          const sheets = ["a", "b", "c"].map((name) => page.parts._addStyle(name, true).link);
+          const add = (name) => page.parts._addStyle(name, true).link;
+          const sheets = ["a", "b", "c"].map(add);
           for (const sheet of sheets) sheet.dispatchEvent(new Event("load"));
           await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
           return times;
