@@ -85,13 +85,20 @@ class FoxgloveBench:
     def since(self, at):
         return [(t, vx) for t, vx in list(self.robot.velocities) if t > at]
 
-    def zero_after(self, at):
-        """Return the seconds until the robot gets a zero, without the machine's own."""
-        first = wait_for(
+    def zero_after(self, at, within):
+        """Check that the robot gets a zero in time, and return the zero's own time.
+
+        A busy machine may add the time for which threads waited for a processor.
+        """
+        zero = wait_for(
             lambda: next((t for t, vx in self.since(at) if not vx), None), "a zero"
         )
-        print(f"zero after {1000 * (first - at):.0f} ms")
-        return first - at - self.sentinel.stolen(at - 0.1, first)
+        waited = self.sentinel.stolen(at - 0.1, zero)
+        print(
+            f"zero after {1000 * (zero - at):.0f} ms, {1000 * waited:.0f} ms of waiting"
+        )
+        assert zero - at <= within + waited
+        return zero
 
     def check_nothing_moves(self, at, seconds=0.5):
         pass_time(seconds)
@@ -135,23 +142,20 @@ def test_letting_go_stops_the_robot_through_foxglove(bench):
     bench.drive_off()
     at = time.monotonic()
     bench.driver.order("x 0")
-    took = bench.zero_after(at)
-    assert took <= 0.15
-    bench.check_nothing_moves(at + took + 0.1)
+    bench.check_nothing_moves(bench.zero_after(at, 0.15) + 0.1)
 
 
 def test_a_stop_through_foxglove_stays_active_when_the_gate_is_killed(bench):
     bench.drive_off()
     at = time.monotonic()
     bench.driver.order("stop")
-    took = bench.zero_after(at)
-    assert took <= 0.15
+    zero = bench.zero_after(at, 0.15)
     wait_for(lambda: (bench.driver.now["stop"] or {}).get("confirmed"), "confirmation")
     pass_time(2.2)  # the display sends a STOP again that is younger than 2 s
     bench.gate.kill()
     killed = time.monotonic()
     wait_for(lambda: bench.since(killed + 0.1), "zeros of the next gate")
-    bench.check_nothing_moves(at + took + 0.1)
+    bench.check_nothing_moves(zero + 0.1)
     bench.end_stop()
 
 
@@ -159,7 +163,7 @@ def test_a_killed_gate_sends_nothing_more_and_the_next_one_sends_zero(bench):
     bench.drive_off()
     bench.gate.kill()
     at = time.monotonic()
-    bench.zero_after(at + 0.05)
+    bench.zero_after(at + 0.05, 10)
     bench.check_nothing_moves(at + 0.05, 1.0)  # although the key is still held
     bench.finish()
 
@@ -168,7 +172,7 @@ def test_a_killed_display_stops_the_robot_through_foxglove(bench):
     bench.drive_off()
     at = time.monotonic()
     bench.driver.popen.kill()
-    assert bench.zero_after(at) <= 0.3
+    bench.zero_after(at, 0.3)
     bench.check_nothing_moves(at + 0.4)
     bench.driver.end()
     bench.start_display()
@@ -181,7 +185,7 @@ def test_a_stalled_link_to_foxglove_delivers_few_velocities_and_then_zero(bench)
     pass_time(0.8)
     released = time.monotonic()
     bench.hop.release()
-    bench.zero_after(released)
+    bench.zero_after(released, 10)
     pass_time(0.5)
     late = bench.since(at + 0.05)
     assert len([vx for _, vx in late if vx]) <= MOST
@@ -195,9 +199,8 @@ def test_zero_is_late_while_other_clients_stall_the_bridge(bench, stalled, order
     stalled()
     at = time.monotonic()
     bench.driver.order(order)
-    took = bench.zero_after(at)
-    assert took <= STALL * CLIENTS[type(bench.robot)] + 0.15
-    bench.check_nothing_moves(at + took + 0.1)
+    zero = bench.zero_after(at, STALL * CLIENTS[type(bench.robot)] + 0.15)
+    bench.check_nothing_moves(zero + 0.1)
     if order == "stop":
         bench.end_stop()
 
@@ -226,6 +229,6 @@ def test_the_gate_ends_with_zero(bench):
     bench.drive_off()
     at = time.monotonic()
     bench.gate.send_signal(signal.SIGTERM)
-    assert bench.zero_after(at) <= 0.3
+    bench.zero_after(at, 0.3)
     bench.check_nothing_moves(at + 0.4)
     bench.finish()
