@@ -223,6 +223,7 @@ class SdkServer:
         self.received = []
         self.advertised = []
         self.subscribed = []
+        self.graph_watched = False
         self.context = foxglove.Context()
         self.channels = {}
         for topic, (type, *_) in topics.items():
@@ -265,6 +266,11 @@ class SdkServer:
         self.channels[topic].log(data)
 
     def graph(self, publishers=None, subscribers=None):
+        """Publish the nodes of topics.
+
+        This waits forever if a client subscribes to the graph at the same time: the
+        server calls its listener with a lock that publishing waits for.
+        """
         graph = foxglove.ConnectionGraph()
         for topic, nodes in (publishers or {}).items():
             graph.set_published_topic(topic, nodes)
@@ -345,7 +351,7 @@ class SdkServer:
         pass
 
     def on_connection_graph_subscribe(self):
-        pass
+        self.graph_watched = True
 
     def on_connection_graph_unsubscribe(self):
         pass

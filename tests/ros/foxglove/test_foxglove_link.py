@@ -237,8 +237,9 @@ def test_nodes_are_known_when_the_server_names_them():
     async def scenario():
         with sdk_server() as server:
             async with bridged(server) as bridge:
-                await until(lambda: bridge._link._main.info)
+                await until(lambda: bridge._link._main.info and server.graph_watched)
                 assert await bridge.publishers("/odom") is None
+                await asyncio.sleep(0.1)  # the listener of the server has returned
                 server.graph({"/odom": ["/base", "/foxglove_bridge"]}, {"/odom": []})
                 await until(lambda: bridge._link._main.publishers)
                 nodes = await bridge.publishers("/odom")
