@@ -198,7 +198,9 @@ export class VideoPicture {
     clearTimeout(this._timer);
     const socket = this._socket;
     this._socket = null;
-    socket?.close();
+    // Chromium logs a warning if a socket is closed before it is open.
+    if (socket?.readyState === WebSocket.CONNECTING) socket.onopen = () => socket.close();
+    else socket?.close();
     this._decoding.end();
   }
 
