@@ -31,6 +31,9 @@ NODE := node_modules/.installed
 # browser wait for half of their time or more.
 JOBS ?= 2
 WAITING_JOBS ?= 4
+# Beside other parts, test-plain and test-gate use only the time of the processors that
+# those leave, so one test may take minutes.
+PATIENT := --timeout 600
 ARGS ?=
 # The file for the outcome of each test, for the summary of "make test".
 RESULTS ?=
@@ -115,14 +118,14 @@ GATE_BESIDE := $(addprefix tests/gate/test_gate_,activity.py client.py assist_ro
 WITH_GATE := $(filter-out $(GATE_BESIDE),$(wildcard tests/gate/test_*.py tests/base/test_*.py tests/config/test_*.py tests/ros/test_*.py)) \
   tests/ros/foxglove/test_foxglove_protocol.py
 test-gate: $(DEV)
-	$(PY) tools/pytest_beside.py $(JOBS) $(TO_RESULTS) -m "not serial" \
+	$(PY) tools/pytest_beside.py $(JOBS) $(TO_RESULTS) $(PATIENT) -m "not serial" \
 	  --cov --cov-config=tests/gate/coverage.toml --cov-report= $(WITH_GATE)
 	$(BIN)/coverage report --rcfile=tests/gate/coverage.toml --fail-under=100
 
 # The parts of pytest besides test-gate; tests that measure time are in the last three.
 .PHONY: test-plain test-browser test-motion test-load test-time
 test-plain: $(DEV)
-	$(PY) tools/pytest_beside.py $(WAITING_JOBS) $(TO_RESULTS) -m "not browser and not serial$(PICKED)" \
+	$(PY) tools/pytest_beside.py $(WAITING_JOBS) $(TO_RESULTS) $(PATIENT) -m "not browser and not serial$(PICKED)" \
 	  $(addprefix --ignore ,$(WITH_GATE))
 WITH_BROWSER := $(shell grep -rl --include='test_*.py' 'mark\.browser' tests | sort)
 test-browser: $(DEV) $(NODE)

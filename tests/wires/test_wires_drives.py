@@ -11,7 +11,7 @@ import pytest
 from wires_recording import WRITES, agreed, compare, difference, recorded
 from wires_scripts import SCRIPTS
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.slow, pytest.mark.serial, pytest.mark.timeout(300)]
 
 PROGRAM = Path(__file__).with_name("wires_scripts.py")
 

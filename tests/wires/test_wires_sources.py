@@ -9,7 +9,7 @@ import pytest
 from wires_recording import WRITES, agreed, compare
 from wires_sources import SOURCES, WRONG
 
-pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
 
 PROGRAM = Path(__file__).with_name("wires_sources.py")
 
@@ -34,7 +34,7 @@ def played(folder, mode, chosen):
         [sys.executable, PROGRAM, folder / "played.json", mode, *chosen],
         capture_output=True,
         text=True,
-        timeout=280,
+        timeout=850,
         check=False,
     )
     assert done.returncode == 0, done.stderr
