@@ -112,8 +112,8 @@ class Robot(VisibleRobot):
 
     def to_config(self) -> RobotConfig:
         """Return the configuration of the robot, its topics and its named modules."""
-        feed, tf, own = self.feed, self.tf, self.pose_source.own_alignment
-        odometry = frames = None
+        feed, own = self.feed, self.pose_source.own_alignment
+        odometry = None
         if feed is not None:
             odometry = OdometryConfig(
                 topic=feed.topic,
@@ -121,15 +121,13 @@ class Robot(VisibleRobot):
                 throttle=feed.throttle,
                 bridge=feed.bridge.url,
             )
-        if tf is not None:
-            frames = TfConfig(**{**tf, "bridge": tf["bridge"].url})
         return RobotConfig(
             name=self.name,
             base_link=self.base_link or "base_link",
             classes=[name for name in self.svg.classes if name not in OWN_CLASSES],
             model=element_to_dict(self.model, self.model_images.names),
             odometry=odometry,
-            tf=frames,
+            tf=self.pose_source.tf,
             alignment=None if own is None else numbers(own),
             battery_low=self.battery_low,
             tags=list(self.tags),
