@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from webmap.discovery import discover
+from webmap.config.robot import RobotConfig
+from webmap.discovery import FoundRobot, Guess, discover
+from webmap.discovery.findings import TopicRole
 from webmap.discovery.fleet_toml import fleet_toml
 
 ROS1 = {
@@ -44,6 +46,31 @@ def test_the_action_and_initial_pose_of_ros_1_and_ros_2_are_found(topics, action
     assert robot.action == action
     assert robot.topic("initialpose") == pose
     assert robot.topic("goal")
+
+
+@pytest.mark.parametrize("before", ["/", "", "//bob/"])
+@pytest.mark.parametrize("action", ["navigate_to_pose/_action/feedback", "base/goal"])
+def test_the_configuration_of_a_found_robot_passes_the_checks_of_a_fleet_file(
+    before, action
+):
+    topics: dict[TopicRole, str] = {
+        "odometry": "odom",
+        "velocity": "cmd_vel",
+        "goal": "goal",
+        "action": action,
+        "cancel": "cancel",
+        "initialpose": "pose",
+        "tf": "tf",
+    }
+    guesses = {role: (Guess(before + name, "", ""),) for role, name in topics.items()}
+    config = FoundRobot("Bob", "", guesses).config("ws://robot:9090")
+    assert RobotConfig.from_dict(config.to_dict()) == config
+    assert config.move is not None
+    assert config.move.action is not None
+
+
+def test_a_topic_that_is_only_the_end_of_an_action_name_gives_no_action():
+    assert FoundRobot("Bob", "", {"action": (Guess("/goal", "", ""),)}).action is None
 
 
 def test_a_robot_with_only_a_goal_topic_has_no_action():

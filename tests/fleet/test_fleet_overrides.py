@@ -199,3 +199,9 @@ def test_view_show_lists_only_the_given_topics_if_the_bridge_is_unreachable():
     assert lines == ["Bob (from --robot)", "  odometry    /odom"]
     assert "cannot reach the rosbridge" in shown.stderr
     assert "Only the topics of --robot can be drawn" in shown.stderr
+
+
+def test_a_command_timeout_that_no_base_can_have_is_refused():
+    Overrides(stops_within=0.25)
+    with pytest.raises(ConfigError, match=r"--stops-within: .*, at most 1e\+06"):
+        Overrides(stops_within=1e9)

@@ -150,7 +150,6 @@ class FleetConfig(Config, kw_only=True, frozen=True):
     def to_dict(self) -> dict[str, Any]:
         """Return the configuration as plain data, as in a file."""
         data: dict[str, Any] = msgspec.to_builtins(self)
-        data["robots"] = [robot.to_dict() for robot in self.robots]
         return data
 
 

@@ -15,6 +15,8 @@ from typing import (
     TypeVar,
 )
 
+import msgspec
+
 from webmap.base.errors import ConfigError, MotionError
 from webmap.base.geometry import Orientation, Position, Quaternion, Twist
 from webmap.base.scope import no_scope
@@ -200,11 +202,26 @@ class MovableRobot(Extendable):
         if key not in self._keys:
             keys = ", ".join(self._keys)
             raise ConfigError(f'{what}: there is no key "{key}" here; there are {keys}')
-        if key in LINKED and value is not None:
+        self.set_part(key, read_key(RobotConfig, key, value, what), bridge)
+
+    def set_part(self, key: str, part: Any, bridge: Bridge | None = None) -> None:
+        """Set or clear one key of the robot's configuration, to a value that is read.
+
+        Args:
+            key: The key.
+            part: The value of this field in a ``RobotConfig``.
+            bridge: The bridge of a part that has one of its own.
+
+        Raises:
+            ConfigError: If the value does not fit the robot's other values, or the
+                bridge is missing.
+
+        """
+        if key in LINKED and part is not None:
             if bridge is None:
-                raise ConfigError(f"{what}: {key}: a bridge is missing")
-            value = {**value, "bridge": bridge.url}
-        self._set(key, read_key(RobotConfig, key, value, what), bridge)
+                raise ConfigError(f"robot {self.name!r}: {key}: a bridge is missing")
+            part = msgspec.structs.replace(part, bridge=bridge.url)
+        self._set(key, part, bridge)
 
     def _set(self, key: str, part: Any, bridge: Bridge | None) -> None:
         with no_scope():

@@ -8,7 +8,8 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+
+import msgspec
 
 from webmap.base.geometry import Affine, Pose
 from webmap.base.scope import Removal, no_scope
@@ -44,6 +45,8 @@ class PoseSource:
         """The odometry topic, if there is one."""
         self.frames: Frames | None = None
         """The frames that place the poses; None to use poses without a transform."""
+        self.tf: TfConfig | None = None
+        """How they place the poses, with the full name of the robot's own frame."""
         self.bridge: Bridge | None = None
         """The bridge of the poses."""
         self.own_alignment: Pose | None = None
@@ -118,6 +121,9 @@ class PoseSource:
         base, space = tf.base_frame or base_link, frames.namespace
         placing = Placing(frames.buffer, space, tf.map_frame, base, quiet=tf.quiet)
         self.pipeline.placing = placing
+        self.tf = msgspec.structs.replace(
+            tf, map_frame=placing.map_frame, base_frame=placing.base_frame
+        )
         self._robot.motion.base_frame = placing.base_frame
         self._frames_removal = frames.join(self._on_frames, self._needs_frames)
         self._restart()
@@ -125,22 +131,8 @@ class PoseSource:
     def unplace(self) -> None:
         """Stop placing poses by TF; does nothing if TF is not set."""
         self._frames_removal.remove()
-        self.frames = self.pipeline.placing = None
+        self.frames = self.tf = self.pipeline.placing = None
         self._restart()
-
-    @property
-    def tf(self) -> Mapping[str, Any] | None:
-        """The arguments of :meth:`Robot.set_tf`; None if it is not set."""
-        frames, placing = self.frames, self.pipeline.placing
-        if frames is None or placing is None:
-            return None
-        return {
-            "bridge": frames.bridge,
-            "map_frame": placing.map_frame,
-            "base_frame": placing.base_frame,
-            "namespace": frames.namespace,
-            "quiet": placing.quiet,
-        }
 
     def keep_on(self, needed: bool) -> None:
         """Receive all poses also while nobody looks, or only some.

@@ -65,7 +65,8 @@ class Robot(VisibleRobot):
         """Create a robot with its topics and modules.
 
         Args:
-            config: The robot's configuration.
+            config: The robot's configuration; ``RobotConfig.from_dict`` checks its
+                values.
             bridges: Bridges by name or URL, to be shared; others are created.
             model: The drawing, in place of the configured one.
 
@@ -111,8 +112,8 @@ class Robot(VisibleRobot):
 
     def to_config(self) -> RobotConfig:
         """Return the configuration of the robot, its topics and its named modules."""
-        feed, tf, own = self.feed, self.tf, self.pose_source.own_alignment
-        odometry = frames = None
+        feed, own = self.feed, self.pose_source.own_alignment
+        odometry = None
         if feed is not None:
             odometry = OdometryConfig(
                 topic=feed.topic,
@@ -120,15 +121,13 @@ class Robot(VisibleRobot):
                 throttle=feed.throttle,
                 bridge=feed.bridge.url,
             )
-        if tf is not None:
-            frames = TfConfig(**{**tf, "bridge": tf["bridge"].url})
         return RobotConfig(
             name=self.name,
             base_link=self.base_link or "base_link",
             classes=[name for name in self.svg.classes if name not in OWN_CLASSES],
             model=element_to_dict(self.model, self.model_images.names),
             odometry=odometry,
-            tf=frames,
+            tf=self.pose_source.tf,
             alignment=None if own is None else numbers(own),
             battery_low=self.battery_low,
             tags=list(self.tags),
@@ -203,20 +202,20 @@ def apply_config(
         robot.motion.declare()
         if new.tf is not None:  # it may name no other base
             old = old.with_part("tf", None)
-    if _changes_bridge_of_goals(old.resolved(), new.resolved()):
-        robot.configure("initial_pose", None)  # both must always use the same bridge
+    before, after = old.resolved(), new.resolved()
+    if _changes_bridge_of_goals(before, after):
+        robot.set_part("initial_pose", None)  # both must always use the same bridge
     for key in KEYS:
-        before = getattr(old.resolved(), key)
-        after = getattr(new.resolved(), key)
-        if before == after:
+        part = getattr(after, key)
+        if part == getattr(before, key):
             continue
         try:
-            linked = key in LINKED and after is not None
-            bridge = link(after.bridge) if linked else None
-            if isinstance(after, TfConfig) and bridge is not None:
-                _place(robot, after, bridge)
+            linked = key in LINKED and part is not None
+            bridge = link(part.bridge) if linked else None
+            if isinstance(part, TfConfig) and bridge is not None:
+                _place(robot, part, bridge)
             else:
-                robot.configure(key, msgspec.to_builtins(after), bridge)
+                robot.set_part(key, part, bridge)
         except WebMapError as error:
             _note(mistakes, (key,), error, robot.name)
     _set_layers(robot, old, new, link, mistakes)
@@ -235,7 +234,7 @@ def _place(robot: VisibleRobot, tf: TfConfig, bridge: Bridge) -> None:
     # Keep the received frames until the new subscription is made.
     held = frames_of(bridge, tf.namespace).join(lambda: None)
     try:
-        robot.configure("tf", msgspec.to_builtins(tf), bridge)
+        robot.set_part("tf", tf, bridge)
     finally:
         held.remove()
     frame = (robot.tf or {})["map_frame"]

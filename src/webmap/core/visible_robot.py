@@ -8,6 +8,8 @@ import weakref
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import msgspec
+
 from webmap.base.audience import audience
 from webmap.base.geometry import Pose, Quaternion, Twist, Vector3
 from webmap.base.scope import Removal, keep
@@ -294,7 +296,10 @@ class VisibleRobot(MovableRobot):
     @property
     def tf(self) -> Mapping[str, Any] | None:
         """The arguments of :meth:`set_tf`; None if it is not set."""
-        return self.pose_source.tf
+        tf, frames = self.pose_source.tf, self.pose_source.frames
+        if tf is None or frames is None:
+            return None
+        return {**msgspec.structs.asdict(tf), "bridge": frames.bridge}
 
     def set_alignment(self, x: float, y: float, angle: float) -> None:
         """Align the robot's own map, its poses, data and goals, on the common map.

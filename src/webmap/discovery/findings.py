@@ -19,7 +19,7 @@ from webmap.config.robot import (
     TfConfig,
 )
 from webmap.discovery.tf_robots import MAP, WORLD
-from webmap.ros.names import VIDEO, is_type
+from webmap.ros.names import VIDEO, is_type, normalise_topic
 
 TopicRole: TypeAlias = Literal[
     "odometry",
@@ -131,7 +131,7 @@ class FoundRobot:
         if found is None:
             return None
         for tail, type in ACTIONS.items():
-            if found.topic.endswith(tail):
+            if found.topic.endswith(tail) and found.topic != tail:
                 return found.topic.removesuffix(tail), type
         return None
 
@@ -153,7 +153,7 @@ class FoundRobot:
         if self.tf_namespace is None:
             return None
         return TfConfig(
-            namespace=self.tf_namespace,
+            namespace=_resolved(self.tf_namespace),
             # Many robots have odometry, frames and no map: that is not a mistake.
             quiet=not self.tf_alone,
             base_frame=self.base_frame or None,
@@ -191,25 +191,26 @@ class FoundRobot:
         where = self.first("odometry") or self.first("pose")
         if where is None:
             return None
-        return OdometryConfig(topic=where.topic, type=where.type or None)
+        return OdometryConfig(topic=_resolved(where.topic), type=where.type or None)
 
     def _motion(self) -> dict[str, Any]:
         frame, action = self.map_frame, self.action
-        velocity, pose = self.first("velocity"), self.topic("initialpose")
+        velocity, pose = self.topic("velocity"), self.topic("initialpose")
         twist = move = place = None
-        if velocity is not None:
-            twist = TwistConfig(topic=velocity.topic, type=velocity.type or None)
+        if velocity:
+            type = self.type_of("velocity") or None
+            twist = TwistConfig(topic=_resolved(velocity), type=type)
         if self.topic("goal") or action is not None:
             chosen = {} if action is None else {"action_type": action[1]}
             move = MoveConfig(
-                topic=self.topic("goal"),
-                action=None if action is None else action[0],
-                cancel_topic=self.topic("cancel") or None,
+                topic=_resolved(self.topic("goal")),
+                action=None if action is None else _resolved(action[0]),
+                cancel_topic=_resolved(self.topic("cancel")) or None,
                 frame=frame,
                 **chosen,
             )
         if pose:
-            place = InitialPoseConfig(topic=pose, frame=frame)
+            place = InitialPoseConfig(topic=_resolved(pose), frame=frame)
         return {"twist": twist, "move": move, "initial_pose": place}
 
 
@@ -226,6 +227,11 @@ class Findings:
 
     layers: Mapping[str, Layers] = field(default_factory=dict)
     """The layers drawn and left out of each robot, by its namespace."""
+
+
+def _resolved(topic: str) -> str:
+    """Return a topic as a fleet file has it; empty if there is none."""
+    return normalise_topic(topic) if topic else ""
 
 
 def _camera(guess: Guess) -> CameraConfig:

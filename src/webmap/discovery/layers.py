@@ -19,7 +19,7 @@ from webmap.config.robot import ModuleConfig, RobotConfig, is_link
 from webmap.discovery.findings import FoundLayer, Layers
 from webmap.discovery.rules import inside, nearest
 from webmap.modules.declaration import Declaration, FoundTopic, TopicKind, declarations
-from webmap.ros.names import is_topic, normalise_topic, split_type
+from webmap.ros.names import is_topic, split_type
 
 TRAIL = ModuleConfig(name="Trail", options={"length": 10.0})
 """The path of a robot in the past, drawn for every robot."""
@@ -216,7 +216,7 @@ def with_layers(
     drawn_now = (each.module for each in config.layers())
     taken = {topic_of(each) for each in drawn_now if each.name != "Battery"}
     if config.odometry is not None:
-        taken.add(normalise_topic(config.odometry.topic))
+        taken.add(config.odometry.topic)
     for layer in layers:
         declared = declared_kind(layer.kind)[0]
         name = declared.name

@@ -9,7 +9,8 @@ import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.config.checks import same_name
-from webmap.config.motion import MotionConfig
+from webmap.config.motion import MotionConfig, TwistConfig
+from webmap.config.reading import read_key
 from webmap.config.robot import RobotConfig, named_cameras
 from webmap.discovery.findings import (
     ACTIONS,
@@ -131,6 +132,9 @@ class Overrides:
         drive_without_proof: Whether robots may be moved through an old bridge of
             Foxglove.
 
+    Raises:
+        ConfigError: If no base can have that timeout.
+
     """
 
     def __init__(
@@ -141,8 +145,9 @@ class Overrides:
         drive_without_proof: bool = False,
     ) -> None:
         self._settings = tuple(settings)
+        option = "--stops-within"
         self._of_every_base = {
-            "stops_within": stops_within,
+            "stops_within": read_key(TwistConfig, "stops_within", stops_within, option),
             "drive_without_proof": drive_without_proof,
         }
         self._robots: dict[tuple[str, str], str] = {}
