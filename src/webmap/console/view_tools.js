@@ -263,8 +263,7 @@ export function keepInView(map, signal) {
   document.addEventListener("toggle", check, { signal, capture: true });
   signal.addEventListener("abort", () => {
     off();
-    sizes.disconnect();
-    panels.disconnect();
+    for (const observer of [sizes, panels]) observer.disconnect();
   });
 }
 
