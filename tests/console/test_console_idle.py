@@ -65,3 +65,35 @@ def test_an_idle_console_computes_layouts_for_ages_only_and_no_styles(idle) -> N
     more_styles, more_layouts = counts(session)
     assert more_styles - styles <= SECONDS
     assert more_layouts - layouts <= LAYOUTS_A_SECOND * SECONDS
+
+
+MOST_ELEMENTS = 1_250
+"""Elements of a page with one robot; it has about 1,120."""
+
+FOLDED = """() => [...document.querySelectorAll("details:not([open]) > :not(summary)")]
+  .filter((folded) => getComputedStyle(folded).display !== "none")
+  .map(({ className }) => className)"""
+"""The folded parts for which the browser computes styles of their content."""
+
+ABOVE_ALL = """() => {
+  const found = [];
+  const look = (rules) => {
+    for (const { media, selectorText, cssRules } of rules) {
+      if (media && !matchMedia(media.mediaText).matches) continue;
+      if (/(^|, |[ >])(html|body|:root)[^ >]*:has\\(/.test(selectorText)) {
+        found.push(selectorText);
+      }
+      if (cssRules) look(cssRules);
+    }
+  };
+  for (const { cssRules } of document.styleSheets) look(cssRules);
+  return found;
+}"""
+"""The `:has()` that the browser evaluates for each element that any part adds."""
+
+
+def test_the_page_makes_the_browser_style_little_that_nobody_sees(idle: Page) -> None:
+    assert idle.evaluate("document.querySelectorAll('*').length") <= MOST_ELEMENTS
+    assert idle.locator("details:not([open])").count() > 0
+    assert idle.evaluate(FOLDED) == []
+    assert idle.evaluate(ABOVE_ALL) == []

@@ -71,7 +71,7 @@ function showConnection(drive) {
     for (const element of document.querySelectorAll("[data-robot]")) {
       if (!(element instanceof HTMLElement)) continue;
       const mine = drive.robots.get(element.dataset.robot ?? "")?.mine ?? false;
-      if (mine !== "mine" in element.dataset) toggle(element, "mine", mine);
+      element.toggleAttribute("data-mine", mine);
     }
   };
   const look = () => {
@@ -95,16 +95,6 @@ function count() {
   const needs = needed > 0 ? `, ${needed} ${needed === 1 ? "needs" : "need"} someone` : "";
   const stale = old > 0 ? `, ${old} with stale data` : "";
   setText(byId("robots-count"), `${robots}${needs}${stale}`);
-}
-
-/**
- * @param {HTMLElement} element
- * @param {string} name
- * @param {boolean} on
- */
-function toggle(element, name, on) {
-  if (on) element.dataset[name] = "";
-  else delete element.dataset[name];
 }
 
 /**

@@ -4,7 +4,7 @@
  * part of the layout, and stored in the browser.
  */
 
-import { byId, closeSheet, onBeat } from "../web/tools/elements.js";
+import { byId, closeSheet, LATEST, onBeat, SOONEST } from "../web/tools/elements.js";
 
 /** @typedef {import('../web/drive.js').Drive} Drive */
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
@@ -175,12 +175,6 @@ export function listenToActions(map, send, signal) {
     for (const off of offs) off();
   };
 }
-
-/** Milliseconds; an earlier second press belongs to a double click. */
-const SOONEST = 400;
-
-/** Milliseconds after which the first press is forgotten. */
-const LATEST = 4000;
 
 /**
  * The button of the stop test: it lets a robot creep, then ends all commands and

@@ -107,9 +107,13 @@ export function foldTools(signal) {
   const added = new MutationObserver(watch);
   added.observe(tools, { childList: true });
   watch();
+  const opened = new MutationObserver(() => {
+    const open = tools.querySelector(":scope > details[open]");
+    document.body.classList.toggle("docked", open !== null);
+  });
+  opened.observe(tools, { subtree: true, attributeFilter: ["open"] });
   signal.addEventListener("abort", () => {
-    sizes.disconnect();
-    added.disconnect();
+    for (const observer of [sizes, added, opened]) observer.disconnect();
   });
 }
 
@@ -259,8 +263,7 @@ export function keepInView(map, signal) {
   document.addEventListener("toggle", check, { signal, capture: true });
   signal.addEventListener("abort", () => {
     off();
-    sizes.disconnect();
-    panels.disconnect();
+    for (const observer of [sizes, panels]) observer.disconnect();
   });
 }
 

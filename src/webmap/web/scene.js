@@ -5,6 +5,7 @@ import { Listeners } from "./events.js";
 import { BoundItem, Dots } from "./item.js";
 import { Maps } from "./maps.js";
 import { Mount } from "./mount.js";
+import { onBeat } from "./tools/elements.js";
 import { readFrame } from "./wire.js";
 
 /** @typedef {import('./item.js').Item} Item */
@@ -15,9 +16,6 @@ import { readFrame } from "./wire.js";
 
 /** Most images that cannot be loaded and are reported. */
 const MOST_LOST = 20;
-
-/** Milliseconds between two looks for dots that are not shown. */
-const LOOK_PERIOD = 250;
 
 /**
  * The services that the scene needs from its page.
@@ -47,6 +45,8 @@ export class Scene {
   /** @param {ScenePage} page */
   constructor(page) {
     this._page = page;
+    // Before the ages are written: then the browser need not compute a layout for it.
+    this._endLooks = onBeat(() => this._reportUnseen());
     this._clock = new DisplayClock();
     this._ages = new Ages(this._clock, () => this._restale());
     this._dots = new Dots();
@@ -71,7 +71,6 @@ export class Scene {
     /** @type {Set<string>} Paths of images that could not be loaded. */
     this._lost = new Set();
     this._unseen = "";
-    this._looking = setInterval(() => this._reportUnseen(), LOOK_PERIOD);
     // Such an error does not bubble, but it can be captured.
     page.root.addEventListener("error", ({ target }) => this._onLost(target), true);
   }
@@ -80,7 +79,7 @@ export class Scene {
   end() {
     this._clear();
     this._ages.stop();
-    clearInterval(this._looking);
+    this._endLooks();
   }
 
   /** Send which dots are not shown, such as those of a layer that is off. */

@@ -3,7 +3,7 @@ import "./fake_elements.js";
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { stopButton } from "../../../src/webmap/web/tools/elements.js";
+import { clock, stopButton } from "../../../src/webmap/web/tools/elements.js";
 
 function makeButton() {
   const button = stopButton("own", "Stop", () => (button.stops += 1));
@@ -61,4 +61,14 @@ test("a click after a pointerleave or without its own pointerdown sends STOP", (
   button.fire("pointerleave", mouse);
   button.fire("click", mouse);
   assert.equal(button.stops, 4);
+});
+
+test("a time of today is shown as the time of day, another one with its date", () => {
+  const now = new Date();
+  now.setHours(13, 5, 9, 400);
+  assert.equal(clock(now / 1000), "13:05");
+  assert.equal(clock(now / 1000, true), "13:05:09");
+  const other = new Date(2025, 0, 7, 3, 45, 2);
+  assert.equal(clock(other / 1000), "2025-01-07 03:45");
+  assert.equal(clock(other / 1000, true), "2025-01-07 03:45:02");
 });

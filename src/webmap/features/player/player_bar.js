@@ -125,6 +125,7 @@ class PlayerBar {
       this._text,
     );
     this._take = lay(map, this._element, "bottom-left");
+    document.documentElement.classList.add("webmap-plays");
     this._timer = setInterval(() => this._show(), PERIOD);
     this._show();
   }
@@ -133,6 +134,7 @@ class PlayerBar {
     clearInterval(this._timer);
     this._line.destroy();
     this._take();
+    document.documentElement.classList.remove("webmap-plays");
   }
 
   /** @param {Status} status */

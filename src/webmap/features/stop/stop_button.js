@@ -114,6 +114,7 @@ class Stop {
   destroy() {
     for (const off of this._offs) off();
     this._alarm.destroy();
+    document.body.classList.remove("webmap-results");
   }
 
   /** @param {import('../../web/motion/report.js').RobotReport} report */
@@ -139,6 +140,7 @@ class Stop {
     this._reset.show(latched.length > 0, latched, reset);
     setHidden(this._close, verdicts.length === 0);
     setHidden(this._list, verdicts.length === 0 && standing === "");
+    document.body.classList.toggle("webmap-results", !this._list.hidden);
     this._showVerdicts(verdicts.sort(byName));
   }
 
