@@ -39,21 +39,26 @@ RESET = """import("/_webmap/web/access.js")
   .then(({ protocols }) => new Promise((done) => {
     const url = new URL("/_webmap/drive", location.href);
     url.protocol = "ws:";
-    const socket = new WebSocket(url, protocols());
     const { robot: driven } = document.querySelector(".robot.selected").dataset;
     let stopped = false;
-    socket.onmessage = (event) => {
-        const message = JSON.parse(event.data);
-        if (message.op !== "robot") return;
-        if (message.latched) {
-            const { robot, stop } = message;
-            stopped ||= robot === driven;
-            socket.send(JSON.stringify({ op: "reset", robot, stop: stop.id }));
-        } else if (stopped && message.robot === driven) {
-            socket.close();
-            done(message.state);
-        }
+    const open = () => {
+        const socket = new WebSocket(url, protocols());
+        socket.onclose = () => setTimeout(open, 300);  // the display may be too busy
+        socket.onmessage = (event) => {
+            const message = JSON.parse(event.data);
+            if (message.op !== "robot") return;
+            if (message.latched) {
+                const { robot, stop } = message;
+                stopped ||= robot === driven;
+                socket.send(JSON.stringify({ op: "reset", robot, stop: stop.id }));
+            } else if (stopped && message.robot === driven) {
+                socket.onclose = null;
+                socket.close();
+                done(message.state);
+            }
+        };
     };
+    open();
 }))"""
 
 
@@ -212,6 +217,11 @@ class Bench:
         """
         self.tab.wait("document.body.innerText.includes('STOP active')")
         assert self.tab.evaluate(RESET) in {"free", "held", "stopping"}
+
+    def end_repeated_stop(self):
+        """End a STOP that the page sent again after it had lost its connection."""
+        if self.tab.evaluate("document.body.innerText.includes('reset it first')"):
+            self.reset_stop()
 
     def restore(self):
         """Start the display and open the page again if the previous test ended them."""

@@ -104,13 +104,16 @@ export function foldTools(signal) {
     sizes.disconnect();
     for (const each of [tools, ...buttons()]) sizes.observe(each);
   };
-  const added = new MutationObserver(watch);
-  added.observe(tools, { childList: true });
-  watch();
-  const opened = new MutationObserver(() => {
+  const dock = () => {
     const open = tools.querySelector(":scope > details[open]");
     document.body.classList.toggle("docked", open !== null);
-  });
+  };
+  // A list may be open when it is added.
+  const added = new MutationObserver(() => [watch(), dock()]);
+  added.observe(tools, { childList: true });
+  const opened = new MutationObserver(dock);
+  watch();
+  dock();
   opened.observe(tools, { subtree: true, attributeFilter: ["open"] });
   signal.addEventListener("abort", () => {
     for (const observer of [sizes, added, opened]) observer.disconnect();
