@@ -133,7 +133,7 @@ def _drive(bench, seconds):
             break
         except AssertionError:
             refused += 1
-            assert refused < 8, "W does not drive the good robot"
+            assert refused < 5, "W does not drive the good robot"
             bench.end_repeated_stop()
     begun = time.monotonic()
     pass_time(seconds)

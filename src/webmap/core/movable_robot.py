@@ -205,7 +205,7 @@ class MovableRobot(Extendable):
         self.set_part(key, read_key(RobotConfig, key, value, what), bridge)
 
     def set_part(self, key: str, part: Any, bridge: Bridge | None = None) -> None:
-        """Set or clear one key of the robot's configuration, to a value that is read.
+        """Set or clear one key of the configuration; the value was checked before.
 
         Args:
             key: The key.
