@@ -5,6 +5,7 @@
  */
 
 import { checkedList } from "../web/layout.js";
+import { readStored, store } from "../web/stored.js";
 import {
   byId,
   html,
@@ -85,7 +86,7 @@ class RobotList {
   /** @param {Partial<Choice>} part */
   choose(part) {
     this.choice = { ...this.choice, ...part };
-    keep(this.choice);
+    store(KEPT, this.choice);
     this._update();
     this._arrange();
   }
@@ -395,18 +396,9 @@ function noneText(wanted, states) {
 /** @returns {Choice} */
 function kept() {
   try {
-    return checkedList(JSON.parse(localStorage.getItem(KEPT) ?? "null"), KEPT);
+    return checkedList(readStored(KEPT), KEPT);
   } catch {
     return AT_FIRST;
-  }
-}
-
-/** @param {Choice} choice */
-function keep(choice) {
-  try {
-    localStorage.setItem(KEPT, JSON.stringify(choice));
-  } catch {
-    // A browser without storage opens the page with the usual list.
   }
 }
 

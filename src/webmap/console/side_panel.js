@@ -4,6 +4,7 @@
  * part of the layout, and stored in the browser.
  */
 
+import { readStored, store } from "../web/stored.js";
 import { byId, closeSheet, LATEST, onBeat, SOONEST } from "../web/tools/elements.js";
 
 /** @typedef {import('../web/drive.js').Drive} Drive */
@@ -47,7 +48,7 @@ export function listenToPanel(map, signal) {
   };
   const change = (/** @type {Partial<Shown>} */ part) => {
     show({ ...shown, ...part });
-    keep(shown);
+    store(KEPT, shown);
   };
   edge.setAttribute("aria-valuemin", `${NARROWEST}`);
   edge.setAttribute("aria-valuemax", `${WIDEST}`);
@@ -110,25 +111,12 @@ function moreOfCard() {
 
 /** @returns {Shown} */
 function kept() {
-  try {
-    const { open, width, more } = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
-    return {
-      open: open !== false,
-      width: Number.isFinite(width) ? width : USUAL,
-      more: more === true,
-    };
-  } catch {
-    return AT_FIRST;
-  }
-}
-
-/** @param {Shown} shown */
-function keep(shown) {
-  try {
-    localStorage.setItem(KEPT, JSON.stringify(shown));
-  } catch {
-    // A browser without storage opens the page with the usual panel.
-  }
+  const { open, width, more } = readStored(KEPT) ?? AT_FIRST;
+  return {
+    open: open !== false,
+    width: Number.isFinite(width) ? width : USUAL,
+    more: more === true,
+  };
 }
 
 /**
