@@ -8,8 +8,10 @@ import { checkedList } from "../web/layout.js";
 import { readStored, store } from "../web/stored.js";
 import {
   byId,
+  forgetOthers,
   html,
   inOrder,
+  keepOrder,
   onBeat,
   setAttribute,
   setHidden,
@@ -188,11 +190,8 @@ class RobotList {
   _showChips(rows, long) {
     const { states } = this.choice;
     const counts = countsOf(rows, states);
-    for (const [group, chip] of this._chips) {
-      if (counts.some((each) => each.group === group)) continue;
-      chip.remove();
-      this._chips.delete(group);
-    }
+    const groups = new Set(counts.map(({ group }) => group));
+    forgetOthers(this._chips, groups, (chip) => chip.remove());
     const firsts = new Map([...rows].reverse().map((row) => [row.group, row]));
     /** @type {HTMLElement[]} */
     const urgent = [];
@@ -282,13 +281,8 @@ class RobotList {
       const title = known ?? html("li", "webmap-one-line minor group-name", { dir: "auto", title: name }, text);
       return [...(name ? [title] : []), ...robots.map(({ row }) => row)];
     });
-    const shown = [...this._list.children];
-    if (wanted.length === shown.length && wanted.every((each, i) => each === shown[i])) return;
     for (const title of old) if (!wanted.includes(title)) title.remove();
-    wanted.forEach((each, index) => {
-      const there = this._list.children[index];
-      if (there !== each) this._list.insertBefore(each, there ?? null);
-    });
+    keepOrder(this._list, wanted);
   }
 
   /** @returns {HTMLElement[]} The buttons that select the listed robots. */
@@ -369,18 +363,6 @@ export function nextNeed(robots, at, by) {
   });
   const ahead = by > 0 ? places : [...places].reverse();
   return ahead.find((place) => at < 0 || (place - at) * by > 0) ?? ahead[0] ?? -1;
-}
-
-/**
- * @param {HTMLElement} parent
- * @param {HTMLElement[]} children In order; one that stays is not moved, to keep the
- *     focus.
- */
-function keepOrder(parent, children) {
-  children.forEach((child, index) => {
-    const there = parent.children[index];
-    if (there !== child) parent.insertBefore(child, there ?? null);
-  });
 }
 
 /**

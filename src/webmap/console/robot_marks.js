@@ -1,5 +1,5 @@
 import { WORDS } from "../web/constants.js";
-import { onBeat, svg } from "../web/tools/elements.js";
+import { forgetOthers, onBeat, svg } from "../web/tools/elements.js";
 import { scaleOf } from "../web/view.js";
 
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
@@ -309,11 +309,7 @@ class ClusterMarks {
   show(clusters) {
     if (!this._group.isConnected) this._map.overlay.append(this._group);
     const keys = new Set(clusters.map(([first]) => first.id));
-    for (const [key, { element }] of this._marks) {
-      if (keys.has(key)) continue;
-      element.remove();
-      this._marks.delete(key);
-    }
+    forgetOthers(this._marks, keys, ({ element }) => element.remove());
     for (const robots of clusters) {
       const key = robots[0].id;
       // The element stays, so that a press on it does not miss.
