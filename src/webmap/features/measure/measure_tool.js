@@ -1,5 +1,4 @@
 import { devicesOf } from "../../web/inputs/devices.js";
-import { attentive } from "../../web/inputs/focus.js";
 import { apply, unapply } from "../../web/view.js";
 import { button, html, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
@@ -87,16 +86,8 @@ class MeasureTool {
     root.addEventListener("pointermove", (event) => this._move(event), first);
     root.addEventListener("pointerup", (event) => this._up(event), first);
     root.addEventListener("pointercancel", () => (this._pointer = null), first);
-    window.addEventListener("keydown", (event) => this._keyDown(event), { signal });
-  }
-
-  /** @param {KeyboardEvent} event */
-  _keyDown(event) {
-    if (event.key !== this._key || event.repeat || event.isComposing) return;
-    if (event.ctrlKey || event.altKey || event.metaKey || !attentive()) return;
-    const { active } = devicesOf(this._map.drive);
-    if (active !== null && active.map !== this._map) return;
-    this._toggle();
+    const devices = devicesOf(this._map.drive);
+    devices.listenToTool(this._map, this._key, () => this._toggle(), signal);
   }
 
   _toggle() {
