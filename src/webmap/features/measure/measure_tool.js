@@ -2,7 +2,7 @@ import { devicesOf } from "../../web/inputs/devices.js";
 import { apply, unapply } from "../../web/view.js";
 import { button, html, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
-import { claimPresses, tool, toolName } from "../../web/tools/tool.js";
+import { claimPresses, tool, toolDrawing, toolName } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/view.js').Point} Point */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -54,11 +54,7 @@ class MeasureTool {
     this._message = html("span", "webmap-measure-word", { role: "status" });
     const panel = tool("webmap-measure", "Measure", this._button, this._message);
     this._path = svg("path", { class: "webmap-measure-line webmap-line" });
-    this._drawing = svg(
-      "svg",
-      { class: "webmap-measure-drawing", "aria-hidden": "true" },
-      this._path,
-    );
+    this._drawing = toolDrawing("webmap-measure-drawing", this._path);
     this._ending = new AbortController();
     this._listen();
     this._offs = [
