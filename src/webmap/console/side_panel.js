@@ -5,7 +5,14 @@
  */
 
 import { readStored, store } from "../web/stored.js";
-import { byId, closeSheet, LATEST, onBeat, SOONEST } from "../web/tools/elements.js";
+import { isTested } from "../web/motion/measurements.js";
+import {
+  byId,
+  closeSheet,
+  DoublePress,
+  onBeat,
+  setAttribute,
+} from "../web/tools/elements.js";
 
 /** @typedef {import('../web/drive.js').Drive} Drive */
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
@@ -132,9 +139,7 @@ export function listenToActions(map, send, signal) {
   const show = () => {
     test.show(map.selected, performance.now());
     const button = document.querySelector("[data-act=follow]");
-    const pressed = `${map.following !== 0}`;
-    if (button?.getAttribute("aria-pressed") === pressed) return;
-    button?.setAttribute("aria-pressed", pressed);
+    if (button) setAttribute(button, "aria-pressed", `${map.following !== 0}`);
   };
   const act = (/** @type {MouseEvent} */ event) => {
     if (!(event.target instanceof Element) || map.selected === null) return;
@@ -173,8 +178,7 @@ export class StopTestButton {
   /** @param {Drive} drive */
   constructor(drive) {
     this._drive = drive;
-    /** @type {{robot: string, at: number} | null} */
-    this._first = null;
+    this._presses = new DoublePress();
   }
 
   /**
@@ -200,11 +204,9 @@ export class StopTestButton {
   state(robot, now) {
     const report = robot === null ? undefined : this._drive.robots.get(robot);
     if (!report) return "none";
-    if (report.test?.state === "creeping" || report.test?.state === "waiting") {
-      return "running";
-    }
+    if (isTested(report)) return "running";
     if (!report.mine) return "take";
-    return this._waits(robot, now) ? "asking" : "ready";
+    return this._waits(report.robot, now) ? "asking" : "ready";
   }
 
   /**
@@ -213,19 +215,16 @@ export class StopTestButton {
    */
   press(robot, now) {
     if (!this._drive.robots.get(robot)?.mine) return;
-    if (!this._waits(robot, now)) this._first = { robot, at: now };
-    else if (this._first && now - this._first.at >= SOONEST) {
-      this._first = null;
-      this._drive.stopTest(robot);
-    }
+    this._presses.look([robot]);
+    if (this._presses.press(now, [robot])) this._drive.stopTest(robot);
   }
 
   /**
-   * @param {string | null} robot
+   * @param {string} robot
    * @param {number} now
    * @returns {boolean} Whether a first press waits for the second.
    */
   _waits(robot, now) {
-    return this._first?.robot === robot && now - this._first.at <= LATEST;
+    return this._presses.meant.includes(robot) && this._presses.waiting(now);
   }
 }
