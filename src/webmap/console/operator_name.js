@@ -1,4 +1,5 @@
 import { signOut } from "../web/access.js";
+import { readStored, store } from "../web/stored.js";
 import { byId, button, html, setText, svg } from "../web/tools/elements.js";
 
 /** @typedef {{name: string, place: string}} Stated */
@@ -130,20 +131,12 @@ class OperatorName {
   _keep({ name, place, verified }) {
     if (verified) return;
     this._stated = { name, place };
-    try {
-      localStorage.setItem(KEPT, JSON.stringify(this._stated));
-    } catch {
-      // The name lasts as long as this page.
-    }
+    store(KEPT, this._stated);
   }
 }
 
 /** @returns {Stated | null} What the person stated before; null if nothing. */
 function kept() {
-  try {
-    const { name, place } = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
-    return typeof name === "string" && typeof place === "string" ? { name, place } : null;
-  } catch {
-    return null; // A browser may block its storage.
-  }
+  const { name, place } = readStored(KEPT) ?? {};
+  return typeof name === "string" && typeof place === "string" ? { name, place } : null;
 }

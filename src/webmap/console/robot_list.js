@@ -5,10 +5,13 @@
  */
 
 import { checkedList } from "../web/layout.js";
+import { readStored, store } from "../web/stored.js";
 import {
   byId,
+  forgetOthers,
   html,
   inOrder,
+  keepOrder,
   onBeat,
   setAttribute,
   setHidden,
@@ -85,7 +88,7 @@ class RobotList {
   /** @param {Partial<Choice>} part */
   choose(part) {
     this.choice = { ...this.choice, ...part };
-    keep(this.choice);
+    store(KEPT, this.choice);
     this._update();
     this._arrange();
   }
@@ -187,11 +190,8 @@ class RobotList {
   _showChips(rows, long) {
     const { states } = this.choice;
     const counts = countsOf(rows, states);
-    for (const [group, chip] of this._chips) {
-      if (counts.some((each) => each.group === group)) continue;
-      chip.remove();
-      this._chips.delete(group);
-    }
+    const groups = new Set(counts.map(({ group }) => group));
+    forgetOthers(this._chips, groups, (chip) => chip.remove());
     const firsts = new Map([...rows].reverse().map((row) => [row.group, row]));
     /** @type {HTMLElement[]} */
     const urgent = [];
@@ -281,13 +281,8 @@ class RobotList {
       const title = known ?? html("li", "webmap-one-line minor group-name", { dir: "auto", title: name }, text);
       return [...(name ? [title] : []), ...robots.map(({ row }) => row)];
     });
-    const shown = [...this._list.children];
-    if (wanted.length === shown.length && wanted.every((each, i) => each === shown[i])) return;
     for (const title of old) if (!wanted.includes(title)) title.remove();
-    wanted.forEach((each, index) => {
-      const there = this._list.children[index];
-      if (there !== each) this._list.insertBefore(each, there ?? null);
-    });
+    keepOrder(this._list, wanted);
   }
 
   /** @returns {HTMLElement[]} The buttons that select the listed robots. */
@@ -371,18 +366,6 @@ export function nextNeed(robots, at, by) {
 }
 
 /**
- * @param {HTMLElement} parent
- * @param {HTMLElement[]} children In order; one that stays is not moved, to keep the
- *     focus.
- */
-function keepOrder(parent, children) {
-  children.forEach((child, index) => {
-    const there = parent.children[index];
-    if (there !== child) parent.insertBefore(child, there ?? null);
-  });
-}
-
-/**
  * @param {string} wanted
  * @param {string[]} states
  */
@@ -395,18 +378,9 @@ function noneText(wanted, states) {
 /** @returns {Choice} */
 function kept() {
   try {
-    return checkedList(JSON.parse(localStorage.getItem(KEPT) ?? "null"), KEPT);
+    return checkedList(readStored(KEPT), KEPT);
   } catch {
     return AT_FIRST;
-  }
-}
-
-/** @param {Choice} choice */
-function keep(choice) {
-  try {
-    localStorage.setItem(KEPT, JSON.stringify(choice));
-  } catch {
-    // A browser without storage opens the page with the usual list.
   }
 }
 

@@ -1,6 +1,6 @@
 import { WORDS } from "../web/constants.js";
-import { onBeat, svg } from "../web/tools/elements.js";
-import { scaleOf } from "../web/view.js";
+import { forgetOthers, onBeat, svg } from "../web/tools/elements.js";
+import { scale as scaled, scaleOf, translate } from "../web/view.js";
 
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
 
@@ -309,11 +309,7 @@ class ClusterMarks {
   show(clusters) {
     if (!this._group.isConnected) this._map.overlay.append(this._group);
     const keys = new Set(clusters.map(([first]) => first.id));
-    for (const [key, { element }] of this._marks) {
-      if (keys.has(key)) continue;
-      element.remove();
-      this._marks.delete(key);
-    }
+    forgetOthers(this._marks, keys, ({ element }) => element.remove());
     for (const robots of clusters) {
       const key = robots[0].id;
       // The element stays, so that a press on it does not miss.
@@ -404,9 +400,7 @@ function zoomTo(map, robots) {
   const room = (FILLED * Math.min(map.width, map.height)) / 2;
   const scale = scaleOf(map.view);
   const factor = Math.min(Math.max(room / reach, 2 * scale), TRUE_SIZE) / scale;
-  const { a, b, c, d } = map.view;
-  const view = { a: a * factor, b: b * factor, c: c * factor, d: d * factor, e: 0, f: 0 };
-  view.e = map.width / 2 - (view.a * x + view.c * y);
-  view.f = map.height / 2 - (view.b * x + view.d * y);
-  map.setView(view);
+  const at = map.toScreen(x, y);
+  const there = translate(map.view, map.width / 2 - at.x, map.height / 2 - at.y);
+  map.setView(scaled(there, factor, map.width / 2, map.height / 2));
 }

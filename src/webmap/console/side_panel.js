@@ -4,7 +4,15 @@
  * part of the layout, and stored in the browser.
  */
 
-import { byId, closeSheet, LATEST, onBeat, SOONEST } from "../web/tools/elements.js";
+import { readStored, store } from "../web/stored.js";
+import { isTested } from "../web/motion/measurements.js";
+import {
+  byId,
+  closeSheet,
+  DoublePress,
+  onBeat,
+  setAttribute,
+} from "../web/tools/elements.js";
 
 /** @typedef {import('../web/drive.js').Drive} Drive */
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
@@ -47,7 +55,7 @@ export function listenToPanel(map, signal) {
   };
   const change = (/** @type {Partial<Shown>} */ part) => {
     show({ ...shown, ...part });
-    keep(shown);
+    store(KEPT, shown);
   };
   edge.setAttribute("aria-valuemin", `${NARROWEST}`);
   edge.setAttribute("aria-valuemax", `${WIDEST}`);
@@ -110,25 +118,12 @@ function moreOfCard() {
 
 /** @returns {Shown} */
 function kept() {
-  try {
-    const { open, width, more } = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
-    return {
-      open: open !== false,
-      width: Number.isFinite(width) ? width : USUAL,
-      more: more === true,
-    };
-  } catch {
-    return AT_FIRST;
-  }
-}
-
-/** @param {Shown} shown */
-function keep(shown) {
-  try {
-    localStorage.setItem(KEPT, JSON.stringify(shown));
-  } catch {
-    // A browser without storage opens the page with the usual panel.
-  }
+  const { open, width, more } = readStored(KEPT) ?? AT_FIRST;
+  return {
+    open: open !== false,
+    width: Number.isFinite(width) ? width : USUAL,
+    more: more === true,
+  };
 }
 
 /**
@@ -144,9 +139,7 @@ export function listenToActions(map, send, signal) {
   const show = () => {
     test.show(map.selected, performance.now());
     const button = document.querySelector("[data-act=follow]");
-    const pressed = `${map.following !== 0}`;
-    if (button?.getAttribute("aria-pressed") === pressed) return;
-    button?.setAttribute("aria-pressed", pressed);
+    if (button) setAttribute(button, "aria-pressed", `${map.following !== 0}`);
   };
   const act = (/** @type {MouseEvent} */ event) => {
     if (!(event.target instanceof Element) || map.selected === null) return;
@@ -185,8 +178,7 @@ export class StopTestButton {
   /** @param {Drive} drive */
   constructor(drive) {
     this._drive = drive;
-    /** @type {{robot: string, at: number} | null} */
-    this._first = null;
+    this._presses = new DoublePress();
   }
 
   /**
@@ -212,11 +204,9 @@ export class StopTestButton {
   state(robot, now) {
     const report = robot === null ? undefined : this._drive.robots.get(robot);
     if (!report) return "none";
-    if (report.test?.state === "creeping" || report.test?.state === "waiting") {
-      return "running";
-    }
+    if (isTested(report)) return "running";
     if (!report.mine) return "take";
-    return this._waits(robot, now) ? "asking" : "ready";
+    return this._waits(report.robot, now) ? "asking" : "ready";
   }
 
   /**
@@ -225,19 +215,16 @@ export class StopTestButton {
    */
   press(robot, now) {
     if (!this._drive.robots.get(robot)?.mine) return;
-    if (!this._waits(robot, now)) this._first = { robot, at: now };
-    else if (this._first && now - this._first.at >= SOONEST) {
-      this._first = null;
-      this._drive.stopTest(robot);
-    }
+    this._presses.look([robot]);
+    if (this._presses.press(now, [robot])) this._drive.stopTest(robot);
   }
 
   /**
-   * @param {string | null} robot
+   * @param {string} robot
    * @param {number} now
    * @returns {boolean} Whether a first press waits for the second.
    */
   _waits(robot, now) {
-    return this._first?.robot === robot && now - this._first.at <= LATEST;
+    return this._presses.meant.includes(robot) && this._presses.waiting(now);
   }
 }

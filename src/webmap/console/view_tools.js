@@ -1,5 +1,5 @@
 import { byId, setHidden } from "../web/tools/elements.js";
-import { rotate, translate } from "../web/view.js";
+import { rotate, scale, scaleOf, translate } from "../web/view.js";
 
 /** @typedef {import('../web/view.js').Matrix} Matrix */
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
@@ -26,8 +26,8 @@ const AROUND = 1;
 export function keepSizes(map) {
   let shown = "";
   const keep = () => {
-    const { a, b, c, d } = map.view;
-    const size = (1 / Math.sqrt(Math.abs(a * d - b * c))).toPrecision(4);
+    const { a, b } = map.view;
+    const size = (1 / scaleOf(map.view)).toPrecision(4);
     const turn = Number(Math.atan2(b, a).toFixed(4));
     if (shown === `${size} ${turn}`) return;
     shown = `${size} ${turn}`;
@@ -132,14 +132,7 @@ function zoom(map, factor) {
     map.width / 2,
     map.height / 2,
   ];
-  return {
-    a: view.a * factor,
-    b: view.b * factor,
-    c: view.c * factor,
-    d: view.d * factor,
-    e: (view.e - x) * factor + x,
-    f: (view.f - y) * factor + y,
-  };
+  return scale(view, factor, x, y);
 }
 
 /**
@@ -163,11 +156,10 @@ function showAll({ crowd, world, width, height }, bounds) {
   const all = bounds ?? [box.x, box.y, box.width, box.height];
   const [x, y, across, up] = placesOfRobots(world).reduce(withPlace, all);
   const room = [width - 2 * MARGIN, height - 2 * MARGIN];
-  const scale = Math.min(room[0] / across, room[1] / up);
-  if (!(scale > 0) || !Number.isFinite(scale)) return null;
-  const e = width / 2 - scale * (x + across / 2);
-  const f = height / 2 + scale * (y + up / 2);
-  return { a: scale, b: 0, c: 0, d: -scale, e, f };
+  const k = Math.min(room[0] / across, room[1] / up);
+  if (!(k > 0) || !Number.isFinite(k)) return null;
+  const [e, f] = [width / 2 - k * (x + across / 2), height / 2 + k * (y + up / 2)];
+  return { a: k, b: 0, c: 0, d: -k, e, f };
 }
 
 /**

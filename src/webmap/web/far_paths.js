@@ -1,3 +1,4 @@
+import { forgetOthers, svg } from "./tools/elements.js";
 import { scaleOf, unapply } from "./view.js";
 
 /** @typedef {import('./view.js').Matrix} Matrix */
@@ -17,8 +18,6 @@ import { scaleOf, unapply } from "./view.js";
  * @property {boolean} round Whether it is drawn as a dot, not as an arrowhead.
  * @property {number} least Least size in pixels.
  */
-
-const SVG = "http://www.w3.org/2000/svg";
 
 /** Least size of a robot, and of one that is selected, in pixels. */
 export const LEAST = 6;
@@ -102,8 +101,7 @@ export class FarPaths {
   /** @param {SVGGElement} world */
   constructor(world) {
     this._world = world;
-    this.group = document.createElementNS(SVG, "g");
-    this.group.classList.add("far-robots");
+    this.group = svg("g", { class: "far-robots" });
     /** @type {Map<string, {element: SVGPathElement, d: string, count: number}>} */
     this._paths = new Map();
     /** @type {Map<string, (turn: number) => Outline>} */
@@ -161,11 +159,7 @@ export class FarPaths {
 
   /** Write what has changed since the last time. */
   end() {
-    for (const [key, { element }] of this._paths) {
-      if (this._next.has(key)) continue;
-      element.remove();
-      this._paths.delete(key);
-    }
+    forgetOthers(this._paths, this._next, ({ element }) => element.remove());
     for (const [key, { look, d, count }] of this._next) {
       const path = this._paths.get(key) ?? this._make(look);
       this._paths.set(key, path);
@@ -188,10 +182,7 @@ export class FarPaths {
 
   /** @param {Look} look */
   _make({ attributes }) {
-    const element = document.createElementNS(SVG, "path");
-    for (const [name, value] of Object.entries({ role: "img", ...attributes })) {
-      element.setAttribute(name, value);
-    }
+    const element = svg("path", { role: "img", ...attributes });
     this.group.append(element);
     return { element, d: "", count: 0 };
   }

@@ -1,4 +1,5 @@
 import { LEVELS } from "./constants.js";
+import { readStored, store } from "./stored.js";
 import {
   initialView,
   LARGEST,
@@ -330,19 +331,11 @@ export function keptView(address) {
 export function keepView(address, place) {
   const entries = Object.entries(all()).filter(([other]) => other !== address);
   if (place) entries.push([address, place]);
-  try {
-    localStorage.setItem(KEPT, JSON.stringify(Object.fromEntries(entries.slice(-MOST))));
-  } catch {
-    // Without storage the page starts in its initial state.
-  }
+  store(KEPT, Object.fromEntries(entries.slice(-MOST)));
 }
 
 /** @returns {Record<string, unknown>} */
 function all() {
-  try {
-    const value = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
-    return typeof value === "object" && value !== null && !Array.isArray(value) ? value : {};
-  } catch {
-    return {}; // storage may be blocked, or contain other data
-  }
+  const value = readStored(KEPT);
+  return typeof value === "object" && value !== null && !Array.isArray(value) ? value : {};
 }

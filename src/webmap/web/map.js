@@ -317,15 +317,9 @@ export class MapCanvas {
   }
 
   _show() {
-    const { _matrix: matrix, _view: view } = this;
-    matrix.a = view.a;
-    matrix.b = view.b;
-    matrix.c = view.c;
-    matrix.d = view.d;
-    matrix.e = view.e;
-    matrix.f = view.f;
-    this._transform.setMatrix(matrix);
-    this._pictures.show(view);
+    Object.assign(this._matrix, this._view);
+    this._transform.setMatrix(this._matrix);
+    this._pictures.show(this._view);
   }
 
   _resized() {

@@ -1,3 +1,5 @@
+import { html } from "./tools/elements.js";
+
 /** Milliseconds for which a dismissed failure is not shown again. */
 const SILENCE = 60_000;
 /** Milliseconds for which what is over stays visible, to be readable. */
@@ -16,8 +18,7 @@ export class Notices {
   constructor() {
     /** @type {HTMLElement | null} */
     this._box = null;
-    this._others = document.createElement("div");
-    this._others.className = "webmap-notice others";
+    this._others = html("div", "webmap-notice others");
     /** @type {Map<string, HTMLElement>} */
     this._shown = new Map();
     /** When each failure was dismissed. @type {Map<string, number>} */
@@ -83,12 +84,8 @@ export class Notices {
       this._place();
       return;
     }
-    const notice = document.createElement("div");
-    notice.className = `webmap-notice ${role}`;
-    notice.setAttribute("role", role);
-    const words = document.createElement("span");
-    words.textContent = text;
-    notice.append(words);
+    const words = html("span", "", {}, text);
+    const notice = html("div", `webmap-notice ${role}`, { role }, words);
     if (action) {
       const go = pressable(action.name, () => {
         this.hide(key);
@@ -138,8 +135,7 @@ export class Notices {
 
   _open() {
     if (!this._box?.isConnected) {
-      this._box = document.createElement("div");
-      this._box.className = "webmap-notices";
+      this._box = html("div", "webmap-notices");
       document.body.append(this._box);
     }
     return this._box;
@@ -208,9 +204,7 @@ export class Notices {
  * @param {() => void} act
  */
 function pressable(text, act) {
-  const button = document.createElement("button");
-  button.type = "button";
-  button.textContent = text;
+  const button = html("button", "", { type: "button" }, text);
   button.addEventListener("click", act);
   return button;
 }

@@ -1,6 +1,7 @@
 import {
   button,
   clock,
+  forgetOthers,
   html,
   onBeat,
   setHidden,
@@ -137,12 +138,7 @@ class AlertPanel {
   receive({ alerts, ids, dropped, problem }) {
     if (problem !== undefined) return setText(this._problem, problem);
     for (const alert of alerts) this._set(alert);
-    const listed = new Set(ids);
-    for (const [id, { row }] of this._known) {
-      if (listed.has(id)) continue;
-      row.element.remove();
-      this._known.delete(id);
-    }
+    forgetOthers(this._known, new Set(ids), ({ row }) => row.element.remove());
     this._heard = true;
     this._show(dropped);
     this._signal();

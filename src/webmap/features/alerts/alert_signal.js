@@ -1,3 +1,4 @@
+import { readStored, store } from "../../web/stored.js";
 import { html, setText } from "../../web/tools/elements.js";
 
 /**
@@ -41,15 +42,15 @@ export class Pace {
 /** The two signals, with a switch for each. */
 export class Signals {
   constructor() {
-    const { sound, notify } = readChoice();
+    const { sound, notify } = readStored(KEPT) ?? {};
     /** @type {AudioContext | null} null until a press or a signal. */
     this._audio = null;
     /** Whether the browser allows sound, which it does after a press. */
     this._mayPlay = navigator.userActivation?.hasBeenActive ?? false;
     this._sound = html("input", "", { type: "checkbox" });
-    this._sound.checked = sound;
+    this._sound.checked = sound !== false;
     this._notify = html("input", "", { type: "checkbox" });
-    this._notify.checked = notify && permission() === "granted";
+    this._notify.checked = notify === true && permission() === "granted";
     this._soundNote = html("p", "webmap-muted webmap-alert-note");
     this._notifyNote = html("p", "webmap-muted webmap-alert-note", { role: "status" });
     this._sound.addEventListener("change", () => this._keep());
@@ -120,12 +121,7 @@ export class Signals {
   }
 
   _keep() {
-    const choice = { sound: this._sound.checked, notify: this._notify.checked };
-    try {
-      localStorage.setItem(KEPT, JSON.stringify(choice));
-    } catch {
-      // A browser without storage forgets the choice.
-    }
+    store(KEPT, { sound: this._sound.checked, notify: this._notify.checked });
     this._show();
   }
 
@@ -169,14 +165,4 @@ function beep(audio) {
     tone.stop(audio.currentTime + (index + 1) * TONE);
     if (index === TONES.length - 1) tone.onended = () => void audio.suspend();
   });
-}
-
-/** @returns {{sound: boolean, notify: boolean}} */
-function readChoice() {
-  try {
-    const { sound, notify } = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
-    return { sound: sound !== false, notify: notify === true };
-  } catch {
-    return { sound: true, notify: false };
-  }
 }

@@ -1,4 +1,5 @@
 import { apply, multiply, unapply } from "../../web/view.js";
+import { poseOf } from "../../web/tools/aim.js";
 import { svg } from "../../web/tools/elements.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -83,7 +84,7 @@ export class AlignDrawing {
     const there = between(before, now);
     const onScreen = multiply(this._map.view, there);
     this._shadow.setAttribute("transform", text(onScreen));
-    const at = this._placeOf(robot) ?? before;
+    const at = poseOf(this._map, robot) ?? before;
     this.pivot = this._inSight(apply(there, at.x, at.y));
     const turn = matrixOf({ x: 0, y: 0, angle: now.angle - before.angle });
     const up = apply(turn, 0, 1);
@@ -111,19 +112,6 @@ export class AlignDrawing {
     const { x, y } = apply(view, place.x, place.y);
     const seen = x >= 0 && y >= 0 && x <= width && y <= height;
     return seen ? place : unapply(view, width / 2, height / 2);
-  }
-
-  /**
-   * @param {string} robot
-   * @returns {Point | null} The robot's position on the map.
-   */
-  _placeOf(robot) {
-    const { crowd, world } = this._map;
-    const element = world.querySelector(`.robot[data-robot="${CSS.escape(robot)}"]`);
-    if (element) crowd.draw(element);
-    const onMap = element instanceof SVGGraphicsElement ? element.getCTM() : null;
-    const matrix = onMap && world.getCTM()?.inverse().multiply(onMap);
-    return matrix ? { x: matrix.e, y: matrix.f } : null;
   }
 
   /**

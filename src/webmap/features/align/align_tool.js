@@ -132,10 +132,8 @@ class AlignTool {
       target.addEventListener("pointercancel", () => this._giveUp(), first);
     }
     handle.addEventListener("keydown", (event) => this._key(event), { signal });
-    {
-      const part = this._panel.element;
-      part.addEventListener("keydown", (event) => this._escape(event), { signal });
-    }
+    const { element } = this._panel;
+    element.addEventListener("keydown", (event) => this._escape(event), { signal });
   }
 
   _toggle() {
@@ -155,7 +153,9 @@ class AlignTool {
     this._choose(subject.whole);
     claimPresses(this._map.svg, "align", true);
     this._drawing.handle.focus({ preventScroll: true });
-    this._follow();
+    // The robot may move during the alignment.
+    clearInterval(this._following);
+    this._following = setInterval(() => this._draw(), FOLLOW_PERIOD);
   }
 
   /** @returns {boolean} Whether the tool was active. */
@@ -197,12 +197,6 @@ class AlignTool {
     const { robot } = this._subject;
     this._panel.showMessage("Saving…");
     this._send({ save: { robot, whole: this._whole, ...this._now } });
-  }
-
-  /** The robot may move during the alignment. */
-  _follow() {
-    clearInterval(this._following);
-    this._following = setInterval(() => this._draw(), FOLLOW_PERIOD);
   }
 
   _draw() {

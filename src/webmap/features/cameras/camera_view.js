@@ -1,4 +1,5 @@
 import { CameraCell, signButton } from "./camera_cell.js";
+import { readStored, store } from "../../web/stored.js";
 import { html, setHidden, setText } from "../../web/tools/elements.js";
 
 /** @typedef {import('./camera_cell.js').Camera} Camera */
@@ -254,13 +255,7 @@ const KEY = "webmap.camera";
 
 /** @returns {PanelState} The stored state, or the defaults. */
 export function readState() {
-  /** @type {any} */
-  let stored = null;
-  try {
-    stored = JSON.parse(localStorage.getItem(KEY) ?? "null");
-  } catch {
-    // Not written by WebMap, or no storage: use the defaults.
-  }
+  const stored = readStored(KEY);
   const part = (/** @type {unknown} */ value, /** @type {number} */ otherwise) =>
     typeof value === "number" && value >= 0 && value <= 1 ? value : otherwise;
   return {
@@ -282,11 +277,7 @@ function isPlace(value) {
 
 /** @param {PanelState} kept */
 export function storeState(kept) {
-  try {
-    localStorage.setItem(KEY, JSON.stringify(kept));
-  } catch {
-    // Without storage a reload restores the defaults.
-  }
+  store(KEY, kept);
 }
 
 /**

@@ -43,9 +43,5 @@ export default function attach() {
     setTimeout(() => button.classList.remove("copied"), SHOWN);
   };
   document.addEventListener("click", click, { signal: ending.signal });
-  return {
-    destroy() {
-      ending.abort();
-    },
-  };
+  return { destroy: () => ending.abort() };
 }

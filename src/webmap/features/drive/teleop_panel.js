@@ -4,6 +4,7 @@ import { heldByProgram, isLatched, stopKey } from "../../web/motion/report.js";
 import { begun, capOf, speedOf } from "../../web/motion/status.js";
 import {
   button,
+  forgetOthers,
   html,
   setAttribute,
   setHidden,
@@ -290,11 +291,7 @@ export class Requests {
   show(requests) {
     const asked = requests.filter(({ mine }) => mine);
     const keys = new Set(asked.map(keyOf));
-    for (const [key, { item }] of this._items) {
-      if (keys.has(key)) continue;
-      item.remove();
-      this._items.delete(key);
-    }
+    forgetOthers(this._items, keys, ({ item }) => item.remove());
     for (const request of asked) {
       const { left } = this._items.get(keyOf(request)) ?? this._add(request);
       setText(left, `(${request.left} s)`);

@@ -48,6 +48,10 @@ export async function viewAsSvg(map) {
     const copy = copier.copy(element, {});
     if (copy) inner.append(copy);
   };
+  const addPanel = (/** @type {HTMLElement} */ panel) => {
+    const drawn = drawPanel(panel, frame, (drawing) => copier.copy(drawing, {}));
+    if (drawn) inner.append(drawn);
+  };
   for (const child of map.svg.children) add(child);
   const overlay = overlayOf(map);
   for (const child of overlay?.children ?? []) {
@@ -56,15 +60,10 @@ export async function viewAsSvg(map) {
     if (getComputedStyle(child).display === "none") continue;
     if (child instanceof SVGSVGElement) {
       for (const part of child.children) add(part);
-    } else if (child instanceof HTMLElement) {
-      const drawn = drawPanel(child, frame, (drawing) => copier.copy(drawing, {}));
-      if (drawn) inner.append(drawn);
-    }
+    } else if (child instanceof HTMLElement) addPanel(child);
   }
   for (const panel of overlay?.querySelectorAll(PANELS) ?? []) {
-    if (!(panel instanceof HTMLElement)) continue;
-    const drawn = drawPanel(panel, frame, (drawing) => copier.copy(drawing, {}));
-    if (drawn) inner.append(drawn);
+    if (panel instanceof HTMLElement) addPanel(panel);
   }
   addReferred(root, copier);
   // A document outside all pages loads nothing and checks no content policy.

@@ -2,7 +2,7 @@ import { scaleOf } from "../../web/view.js";
 import { onScreen, PressAim } from "../../web/tools/aim.js";
 import { button, html, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
-import { showNote, tool } from "../../web/tools/tool.js";
+import { showNote, tool, toolDrawing } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -62,12 +62,8 @@ class InitialPoseTool {
     this._panel = tool("webmap-aim webmap-locate", "Initial pose", this._go, this._message);
     this._uncertainty = new PoseUncertainty();
     this._outline = svg("path", { d: OUTLINE, class: "webmap-locate-arrow" });
-    this._drawing = svg(
-      "svg",
-      { class: "webmap-aim-drawing", "aria-hidden": "true" },
-      this._uncertainty.element,
-      this._outline,
-    );
+    const parts = [this._uncertainty.element, this._outline];
+    this._drawing = toolDrawing("webmap-aim-drawing", ...parts);
     this._offs = [
       lay(map, this._drawing),
       ...(buttons ? [lay(map, this._panel, "top-left")] : []),

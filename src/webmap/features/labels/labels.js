@@ -1,5 +1,4 @@
 import { devicesOf } from "../../web/inputs/devices.js";
-import { attentive } from "../../web/inputs/focus.js";
 import { scaleOf, unapply } from "../../web/view.js";
 import { button, html, setHidden, setText } from "../../web/tools/elements.js";
 import { LabelMove } from "./labels_move.js";
@@ -88,18 +87,10 @@ class Labels {
     // Before the map's own listener, which would deselect the robot.
     root.addEventListener("click", (event) => this._clicked(event), first);
     root.addEventListener("keydown", (event) => this._pressed(event), first);
-    window.addEventListener("keydown", (event) => this._keyDown(event), { signal });
+    const turn = () => this._editable && this._activate(!this._active);
+    devicesOf(this._map.drive).listenToTool(this._map, this._key, turn, signal);
     const leave = (/** @type {KeyboardEvent} */ { key }) => key === "Escape" && this._leave();
     this._panel.addEventListener("keydown", leave, { signal });
-  }
-
-  /** @param {KeyboardEvent} event */
-  _keyDown(event) {
-    if (event.key !== this._key || event.repeat || event.isComposing) return;
-    if (event.ctrlKey || event.altKey || event.metaKey || !attentive()) return;
-    const { active } = devicesOf(this._map.drive);
-    if (!this._editable || (active !== null && active.map !== this._map)) return;
-    this._activate(!this._active);
   }
 
   /** @param {KeyboardEvent} event Enter, on a label that has the focus. */

@@ -1,3 +1,4 @@
+import { readStored, store } from "../../web/stored.js";
 import { html, onBeat, setHidden, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 import { foldedTool } from "../../web/tools/tool.js";
@@ -69,7 +70,8 @@ class RosoutPanel {
     this._send = send;
     this._levels = levels;
     this._most = lines;
-    const { open, least } = readChoice();
+    const stored = readStored(KEPT);
+    const open = stored?.open === true;
     /** @type {BridgeLines[]} By the bridge's number. */
     this._books = [];
     this._choice = html("select", "");
@@ -77,7 +79,7 @@ class RosoutPanel {
       const words = `${LOOKS[each]?.[0] ?? each}${each === levels.at(-1) ? "" : " and worse"}`;
       this._choice.append(html("option", "", { value: each }, words));
     }
-    this._choice.value = levels.includes(least) ? least : level;
+    this._choice.value = levels.includes(stored?.least) ? stored.least : level;
     this._leave = map.layout.add("log", {
       read: () => ({ open: this._details.open, least: this._choice.value }),
       write: (log) => this._lay(log.open, log.least),
@@ -177,12 +179,7 @@ class RosoutPanel {
   }
 
   _keep() {
-    const choice = { open: this._details.open, least: this._choice.value };
-    try {
-      localStorage.setItem(KEPT, JSON.stringify(choice));
-    } catch {
-      // A browser without storage starts with the panel folded the next time.
-    }
+    store(KEPT, { open: this._details.open, least: this._choice.value });
   }
 }
 
@@ -262,15 +259,5 @@ class BridgeLines {
     const known = { row, level, times, age, receivedAt: 0 };
     this.rows.set(number, known);
     return known;
-  }
-}
-
-/** @returns {{open: boolean, least: string}} */
-function readChoice() {
-  try {
-    const { open, least } = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
-    return { open: open === true, least: String(least) };
-  } catch {
-    return { open: false, least: "" };
   }
 }

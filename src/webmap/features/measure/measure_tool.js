@@ -1,9 +1,8 @@
 import { devicesOf } from "../../web/inputs/devices.js";
-import { attentive } from "../../web/inputs/focus.js";
 import { apply, unapply } from "../../web/view.js";
 import { button, html, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
-import { claimPresses, tool, toolName } from "../../web/tools/tool.js";
+import { claimPresses, tool, toolDrawing, toolName } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/view.js').Point} Point */
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -55,11 +54,7 @@ class MeasureTool {
     this._message = html("span", "webmap-measure-word", { role: "status" });
     const panel = tool("webmap-measure", "Measure", this._button, this._message);
     this._path = svg("path", { class: "webmap-measure-line webmap-line" });
-    this._drawing = svg(
-      "svg",
-      { class: "webmap-measure-drawing", "aria-hidden": "true" },
-      this._path,
-    );
+    this._drawing = toolDrawing("webmap-measure-drawing", this._path);
     this._ending = new AbortController();
     this._listen();
     this._offs = [
@@ -87,16 +82,8 @@ class MeasureTool {
     root.addEventListener("pointermove", (event) => this._move(event), first);
     root.addEventListener("pointerup", (event) => this._up(event), first);
     root.addEventListener("pointercancel", () => (this._pointer = null), first);
-    window.addEventListener("keydown", (event) => this._keyDown(event), { signal });
-  }
-
-  /** @param {KeyboardEvent} event */
-  _keyDown(event) {
-    if (event.key !== this._key || event.repeat || event.isComposing) return;
-    if (event.ctrlKey || event.altKey || event.metaKey || !attentive()) return;
-    const { active } = devicesOf(this._map.drive);
-    if (active !== null && active.map !== this._map) return;
-    this._toggle();
+    const devices = devicesOf(this._map.drive);
+    devices.listenToTool(this._map, this._key, () => this._toggle(), signal);
   }
 
   _toggle() {

@@ -160,13 +160,9 @@ class PlayerBar {
 
   /** @param {HTMLInputElement} slider */
   _listen(slider) {
-    slider.addEventListener("pointerdown", () => {
-      this._dragged = true;
-    });
+    slider.addEventListener("pointerdown", () => (this._dragged = true));
     for (const end of ["pointerup", "pointercancel", "blur"]) {
-      slider.addEventListener(end, () => {
-        this._dragged = false;
-      });
+      slider.addEventListener(end, () => (this._dragged = false));
     }
     slider.addEventListener("input", () => {
       const at = this._position.want(slider.valueAsNumber, performance.now());
@@ -255,9 +251,7 @@ class MarkLine {
     this.element = html("div", "webmap-player-marks", { role: "group" }, this._none);
     this.element.addEventListener("click", (event) => this._press(event));
     this.element.addEventListener("keydown", (event) => this._move(event));
-    this.element.addEventListener("pointerleave", () => {
-      this._pointed = "";
-    });
+    this.element.addEventListener("pointerleave", () => (this._pointed = ""));
     this._observer = new ResizeObserver(() => this._draw());
     this._observer.observe(this.element);
   }
@@ -315,12 +309,8 @@ class MarkLine {
         svg("svg", { viewBox: "0 0 24 24", "aria-hidden": "true" }, svg("path", { d: SHAPES[group.kind] })),
       );
       button.style.left = `${100 * group.fraction}%`;
-      button.addEventListener("pointerenter", () => {
-        this._pointed = group.text;
-      });
-      button.addEventListener("pointerleave", () => {
-        this._pointed = "";
-      });
+      button.addEventListener("pointerenter", () => (this._pointed = group.text));
+      button.addEventListener("pointerleave", () => (this._pointed = ""));
       return { button, group };
     });
     this.element.append(...this._buttons.map(({ button }) => button));

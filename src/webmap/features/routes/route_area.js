@@ -5,6 +5,8 @@ import { button, html, setHidden, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 import { MOST_CORNERS, problemOf, withoutRepetitions } from "./polygon.js";
 import { PressAim } from "../../web/tools/aim.js";
+import { toolDrawing } from "../../web/tools/tool.js";
+import { row } from "./route_points.js";
 import { planSweeps, SPACING } from "./sweeps.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -302,18 +304,13 @@ class AreaPanel {
     this._take = button("webmap-area-take", "Add to route", acts.take);
     this._leave = button("webmap-area-leave", "Cancel", acts.leave);
     const label = html("label", "webmap-muted webmap-row webmap-area-apart", {}, "Spacing in m ", this._spacing);
-    this._how = html("div", "webmap-row wraps webmap-route-row", {}, label, this._turn);
+    this._how = row(label, this._turn);
     this.element = html(
       "div",
       "webmap-area",
       { role: "group", "aria-label": "Area" },
       this._how,
-      html(
-        "div",
-        "webmap-row wraps webmap-route-row",
-        {},
-        ...[this._done, this._undo, this._here, this._take, this._leave],
-      ),
+      row(this._done, this._undo, this._here, this._take, this._leave),
     );
   }
 
@@ -371,12 +368,8 @@ class AreaDrawing {
     // In metres, like the plan: only the view moves it.
     this._world = svg("g", {}, this._outline, this._ways, this._sweeps);
     this._marks = svg("g", {});
-    this._drawing = svg(
-      "svg",
-      { class: "webmap-route-drawing webmap-area-drawing", "aria-hidden": "true" },
-      this._world,
-      this._marks,
-    );
+    const classes = "webmap-route-drawing webmap-area-drawing";
+    this._drawing = toolDrawing(classes, this._world, this._marks);
     this._offs = [lay(map, this._drawing), map.onView(() => this._place())];
     this._place();
   }

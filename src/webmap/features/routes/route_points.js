@@ -2,9 +2,15 @@ import { LONGEST_NAME } from "../../web/constants.js";
 import { onScreen } from "../../web/tools/aim.js";
 import { button, html, setAttribute, setHidden, setText, svg } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
+import { toolDrawing } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/tools/aim.js').Pose} Pose */
+
+/** @param {...Node} children Of a row in the body of the tool for routes. */
+export function row(...children) {
+  return html("div", "webmap-row wraps webmap-route-row", {}, ...children);
+}
 
 /** A ring with a nose for the heading. */
 const NOSE = "M12-6 22 0 12 6z";
@@ -22,12 +28,7 @@ export class RoutePoints {
     this._points = [];
     this._line = svg("polyline", { class: "webmap-route-line webmap-line" });
     this._group = svg("g", {});
-    this._drawing = svg(
-      "svg",
-      { class: "webmap-route-drawing", "aria-hidden": "true" },
-      this._line,
-      this._group,
-    );
+    this._drawing = toolDrawing("webmap-route-drawing", this._line, this._group);
     this._offs = [lay(map, this._drawing), map.onView(() => this._place())];
   }
 
@@ -122,15 +123,8 @@ export class SavedRoutes {
     });
     this._save = button("webmap-route-save", "Save", () => this._keep());
     this._message = html("p", "webmap-route-word", { role: "status" });
-    this._there = html(
-      "div",
-      "webmap-row wraps webmap-route-row",
-      {},
-      this._chosen,
-      this._load,
-      ...(saves ? [this._delete] : []),
-    );
-    const keep = html("div", "webmap-row wraps webmap-route-row", {}, this._name, this._save);
+    this._there = row(this._chosen, this._load, ...(saves ? [this._delete] : []));
+    const keep = row(this._name, this._save);
     this.element = html(
       "div",
       "webmap-route-saved",

@@ -4,7 +4,7 @@ import { button, html, onBeat, setAttribute, setHidden, setText } from "../../we
 import { lay } from "../../web/tools/overlay.js";
 import { foldedTool } from "../../web/tools/tool.js";
 import { RouteArea } from "./route_area.js";
-import { RoutePoints, SavedRoutes } from "./route_points.js";
+import { row, RoutePoints, SavedRoutes } from "./route_points.js";
 import { LEAST_LOOP, RouteRobots, storeRoute, takeStoredRoute } from "./route_run.js";
 
 /** @typedef {import('../../web/tools/aim.js').Pose} Pose */
@@ -100,20 +100,17 @@ class RouteTool {
       points: this._points,
       loop: this._loops,
     }));
+    const begin = row(this._edit, this._area.button, this._here, this._clear);
+    begin.classList.add("begin");
     this._details = foldedTool(
       "webmap-route",
       "route",
       "Route",
       {},
-      html(
-        "div",
-        "webmap-row wraps webmap-route-row begin",
-        {},
-        ...[this._edit, this._area.button, this._here, this._clear],
-      ),
+      begin,
       this._area.element,
       this._list,
-      html("div", "webmap-row wraps webmap-route-row", {}, this._loop, this._run, this._pause, this._skip, this._end),
+      row(this._loop, this._run, this._pause, this._skip, this._end),
       this._message,
       this._saved.element,
     );

@@ -4,6 +4,7 @@ import { isLatched, stopKey, stopOf } from "../../web/motion/report.js";
 import { Obedience, linesOf, standingStops } from "../../web/motion/stops.js";
 import {
   button,
+  forgetOthers,
   html,
   inOrder,
   setHidden,
@@ -317,11 +318,7 @@ class StopTwins {
    */
   place() {
     const originals = [...document.querySelectorAll(ORIGINALS)].filter(isInSight);
-    for (const [original, twin] of this._twins) {
-      if (originals.includes(original)) continue;
-      this._twins.delete(original);
-      twin.remove();
-    }
+    forgetOthers(this._twins, new Set(originals), (twin) => twin.remove());
     const room = { all: false, top: 0, bottom: 0 };
     for (const original of originals) {
       const { left, top, right, bottom } = original.getBoundingClientRect();

@@ -1,4 +1,4 @@
-import { button } from "../../web/tools/elements.js";
+import { button, setAttribute } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -20,10 +20,7 @@ export default function attach(map, _options, send) {
     send({ follow: map.following ? null : map.selected });
   });
   const show = () => {
-    const following = String(Boolean(map.following));
-    if (toggle.getAttribute("aria-pressed") !== following) {
-      toggle.setAttribute("aria-pressed", following);
-    }
+    setAttribute(toggle, "aria-pressed", String(Boolean(map.following)));
     toggle.disabled = !map.following && map.selected === null;
   };
   toggle.title = "Move the map with the selected robot";

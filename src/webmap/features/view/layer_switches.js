@@ -1,3 +1,4 @@
+import { readStored, store } from "../../web/stored.js";
 import { html, inOrder, onBeat, setHidden, setText } from "../../web/tools/elements.js";
 import { lay } from "../../web/tools/overlay.js";
 import { foldedTool } from "../../web/tools/tool.js";
@@ -244,7 +245,7 @@ class LayerSwitches {
     box.checked = this._isOn(key) === (box.value === "on");
     box.addEventListener("change", () => {
       this._shown[key] = box.checked === (box.value === "on");
-      storeChoice(this._shown);
+      store(KEPT, this._shown);
       this._apply();
     });
     return box;
@@ -348,7 +349,7 @@ class LayerSwitches {
    */
   _lay(open, shown) {
     this._shown = { ...shown };
-    storeChoice(this._shown);
+    store(KEPT, this._shown);
     this._check();
     this._details.open = open;
     this._apply();
@@ -378,20 +379,6 @@ function textOf(key, keys) {
 
 /** @returns {Record<string, boolean>} The choice stored in this browser. */
 function readChoice() {
-  try {
-    const value = JSON.parse(localStorage.getItem(KEPT) ?? "{}");
-    const choices = Object.entries(value).filter(([, on]) => typeof on === "boolean");
-    return Object.fromEntries(choices);
-  } catch {
-    return {}; // no storage, or not written by WebMap
-  }
-}
-
-/** @param {Record<string, boolean>} shown */
-function storeChoice(shown) {
-  try {
-    localStorage.setItem(KEPT, JSON.stringify(shown));
-  } catch {
-    // Without storage the choice is not kept.
-  }
+  const choices = Object.entries(readStored(KEPT) ?? {});
+  return Object.fromEntries(choices.filter(([, on]) => typeof on === "boolean"));
 }

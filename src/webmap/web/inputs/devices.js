@@ -5,7 +5,7 @@
  * the inputs move a robot is decided in `../motion`.
  */
 
-import { takesKeys, takesText } from "./focus.js";
+import { attentive, takesKeys, takesText } from "./focus.js";
 import { Gamepads } from "./gamepads.js";
 import { Keys } from "./keys.js";
 import { PadMaps } from "./pad_maps.js";
@@ -181,6 +181,23 @@ export class Devices {
     return () => {
       this._keyUsers.delete(use);
     };
+  }
+
+  /**
+   * Let a key turn a tool of a map on and off, unless another map is the active one.
+   *
+   * @param {import('../map.js').MapCanvas} map
+   * @param {string} wanted The key; "" for none.
+   * @param {() => void} turn
+   * @param {AbortSignal} signal
+   */
+  listenToTool(map, wanted, turn, signal) {
+    const pressed = (/** @type {KeyboardEvent} */ event) => {
+      if (event.key !== wanted || event.repeat || event.isComposing) return;
+      if (event.ctrlKey || event.altKey || event.metaKey || !attentive()) return;
+      if (this.active === null || this.active.map === map) turn();
+    };
+    window.addEventListener("keydown", pressed, { signal });
   }
 
   /**

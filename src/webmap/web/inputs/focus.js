@@ -75,47 +75,25 @@ export function attentive() {
  */
 export function watchAttention(onDistraction, onReturn) {
   const ending = new AbortController();
-  const options = { signal: ending.signal, capture: true };
+  const { signal } = ending;
+  const options = { signal, capture: true };
   const distract = () => onDistraction(false);
   const leave = () => onDistraction(true);
-  window.addEventListener(
-    "blur",
-    (event) => {
-      if (event.target === window) distract();
-    },
-    options,
-  );
+  const blur = (/** @type {Event} */ { target }) => target === window && distract();
+  const drag = (/** @type {Event} */ event) => !event.defaultPrevented && distract();
+  const focus = (/** @type {Event} */ { target }) => takesKeys(target) && distract();
+  const back = (/** @type {PageTransitionEvent} */ event) => {
+    if (event.persisted) onReturn();
+  };
+  const hide = () => document.visibilityState === "hidden" && leave();
+  window.addEventListener("blur", blur, options);
   window.addEventListener("contextmenu", distract, options);
   // During a drag the page receives neither keys nor their releases.
-  window.addEventListener(
-    "dragstart",
-    (event) => {
-      if (!event.defaultPrevented) distract();
-    },
-    { signal: ending.signal },
-  );
-  window.addEventListener(
-    "focusin",
-    (event) => {
-      if (takesKeys(event.target)) distract();
-    },
-    options,
-  );
+  window.addEventListener("dragstart", drag, { signal });
+  window.addEventListener("focusin", focus, options);
   window.addEventListener("pagehide", leave, options);
-  window.addEventListener(
-    "pageshow",
-    (event) => {
-      if (event.persisted) onReturn();
-    },
-    options,
-  );
-  document.addEventListener(
-    "visibilitychange",
-    () => {
-      if (document.visibilityState === "hidden") leave();
-    },
-    options,
-  );
+  window.addEventListener("pageshow", back, options);
+  document.addEventListener("visibilitychange", hide, options);
   document.addEventListener("freeze", leave, options);
   document.addEventListener("resume", onReturn, options);
   return () => ending.abort();

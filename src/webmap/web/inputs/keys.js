@@ -60,11 +60,8 @@ export function axesOf(codes, { holonomic = false } = {}) {
   const meaning = holonomic ? { ...MEANING, ...SIDEWAYS } : MEANING;
   const axes = { x: 0, y: 0, turn: 0 };
   for (const code of codes) {
-    const {
-      x = 0,
-      y = 0,
-      turn = 0,
-    } = Object.hasOwn(meaning, code) ? meaning[code] : {};
+    const known = Object.hasOwn(meaning, code) ? meaning[code] : {};
+    const { x = 0, y = 0, turn = 0 } = known;
     axes.x += x;
     axes.y += y;
     axes.turn += turn;

@@ -33,17 +33,12 @@ export class Stick {
     const options = { signal: this._ending.signal };
     pad.addEventListener("pointerdown", (event) => this._down(event), options);
     pad.addEventListener("pointermove", (event) => this._move(event), options);
-    for (const kind of ["pointerup", "pointercancel", "lostpointercapture"]) {
-      pad.addEventListener(
-        kind,
-        (event) => {
-          if (/** @type {PointerEvent} */ (event).pointerId === this._pointer) {
-            this.release();
-          }
-        },
-        options,
-      );
-    }
+    const end = (/** @type {PointerEvent} */ event) => {
+      if (event.pointerId === this._pointer) this.release();
+    };
+    pad.addEventListener("pointerup", end, options);
+    pad.addEventListener("pointercancel", end, options);
+    pad.addEventListener("lostpointercapture", end, options);
     // A resting finger would open a menu, and a menu ends driving.
     pad.addEventListener("touchstart", (event) => event.preventDefault(), {
       ...options,

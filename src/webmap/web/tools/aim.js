@@ -1,5 +1,4 @@
 import { devicesOf } from "../inputs/devices.js";
-import { attentive } from "../inputs/focus.js";
 import { apply, unapply } from "../view.js";
 import { claimPresses } from "./tool.js";
 
@@ -217,16 +216,8 @@ export class PressAim {
     svg.addEventListener("pointerleave", () => this.active && this._aims.hover?.(null), first);
     svg.addEventListener("pointercancel", () => this.drop(), first);
     svg.addEventListener("lostpointercapture", () => this.drop(), first);
-    window.addEventListener("keydown", (event) => this._keyDown(event), { signal });
-  }
-
-  /** @param {KeyboardEvent} event */
-  _keyDown(event) {
-    if (event.key !== this._key || event.repeat || event.isComposing) return;
-    if (event.ctrlKey || event.altKey || event.metaKey || !attentive()) return;
-    const { active: drivingMap } = devicesOf(this._map.drive);
-    if (drivingMap !== null && drivingMap.map !== this._map) return;
-    this.toggle();
+    const devices = devicesOf(this._map.drive);
+    devices.listenToTool(this._map, this._key, () => this.toggle(), signal);
   }
 
   /**

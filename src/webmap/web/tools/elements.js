@@ -130,6 +130,36 @@ export function setAttribute(element, name, value) {
   if (element.getAttribute(name) !== value) element.setAttribute(name, value);
 }
 
+/**
+ * Put children into an order.
+ *
+ * @param {Element} parent
+ * @param {Element[]} children A child that has its place already is not moved, to keep
+ *     the focus.
+ */
+export function keepOrder(parent, children) {
+  children.forEach((child, index) => {
+    const there = parent.children[index];
+    if (there !== child) parent.insertBefore(child, there ?? null);
+  });
+}
+
+/**
+ * Forget what is known of things that have disappeared.
+ *
+ * @template K, V
+ * @param {Map<K, V>} known
+ * @param {{has: (key: K) => boolean}} there A set or a map of what is there.
+ * @param {(value: V) => void} remove Called with each value that is forgotten.
+ */
+export function forgetOthers(known, there, remove) {
+  for (const [key, value] of known) {
+    if (there.has(key)) continue;
+    remove(value);
+    known.delete(key);
+  }
+}
+
 /** @type {Intl.Collator | undefined} Made at its first use, which takes 15 ms. */
 let collator;
 

@@ -1,4 +1,4 @@
-import { html } from "./elements.js";
+import { html, keepOrder } from "./elements.js";
 
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
 
@@ -56,11 +56,7 @@ function sortAll() {
   for (const own of unsorted) {
     const panels = [...own.children].map((panel) => ({ panel, place: placeOf(panel, own) }));
     panels.sort((one, other) => one.place - other.place);
-    panels.forEach(({ panel }, index) => {
-      const there = own.children[index];
-      // A panel that is moved loses the focus.
-      if (there !== panel) own.insertBefore(panel, there ?? null);
-    });
+    keepOrder(own, panels.map(({ panel }) => panel));
   }
   unsorted.clear();
 }

@@ -101,6 +101,16 @@ export function claimPresses({ dataset }, name, on) {
 }
 
 /**
+ * Make the drawing of a tool over the whole map.
+ *
+ * @param {string} className
+ * @param {...SVGElement} parts
+ */
+export function toolDrawing(className, ...parts) {
+  return svg("svg", { class: className, "aria-hidden": "true" }, ...parts);
+}
+
+/**
  * Show in an element why an operation was refused, until the causes of all robots are over.
  *
  * @param {Element} element
