@@ -14,6 +14,7 @@ import msgspec
 from webmap.agents import address
 from webmap.agents.peer import peer_of
 from webmap.base.errors import BridgeClosed, ConfigError, WireError
+from webmap.base.nesting import is_too_deep
 from webmap.config.robot import RobotConfig
 from webmap.ros.names import is_agent_url, normalise_url
 
@@ -110,16 +111,9 @@ def _read_robot(text: bytes) -> RobotConfig:
     if len(text) > MOST_OF_ROBOT:
         raise ConfigError(f"got {len(text)} bytes, expected {MOST_OF_ROBOT} at most")
     robot = msgspec.json.decode(text, type=dict[str, Any])
-    if _depth(robot) > DEEPEST:
+    if is_too_deep(robot, DEEPEST):
         raise ConfigError(f"got values nested deeper than {DEEPEST} levels")
     return RobotConfig.from_dict(robot)
-
-
-def _depth(value: Any) -> int:
-    if not isinstance(value, dict | list):
-        return 0
-    inside = value.values() if isinstance(value, dict) else value
-    return 1 + max(map(_depth, inside), default=0)
 
 
 def agents_behind(

@@ -314,9 +314,6 @@ class RemoteGate:
         match message:
             case protocol.Ready() | protocol.CloseConnection():
                 return  # the page has robots of other gates too
-            case protocol.RefusedCount():
-                last = f"{message.by}: {message.last}"
-                message = replace(message, by=f"the agent {self.agent}", last=last)
             case StopAck():
                 if (message.display, message.session) == (
                     self.display,

@@ -228,24 +228,29 @@ def access_rules(users: Mapping[str, UserEntry]) -> dict[str, Any]:
             gets = [key for each in agents for key in _keys_for_display(each, user)]
             asks, answers = [f"webmap/{each}/about/**" for each in agents], []
             names = [*gets, beacon(EVERY)]  # it finds only those that it reaches
-        found = [
-            _rule(f"{user}-sends", ["put"], ["ingress"], sends),
-            _rule(f"{user}-gets", ["put"], ["egress"], gets),
-            _rule(f"{user}-subscribes", ["declare_subscriber"], ["ingress"], names),
-            _rule(f"{user}-told", ["declare_subscriber"], ["egress"], sends),
+        rows = [
+            ("sends", "put", "ingress", sends),
+            ("gets", "put", "egress", gets),
+            ("subscribes", "declare_subscriber", "ingress", names),
+            ("told", "declare_subscriber", "egress", sends),
+            ("asks", "query", "ingress", asks),
+            ("answered", "reply", "egress", asks),
+            ("finds", "declare_queryable", "egress", asks),
+            ("offers", "declare_queryable", "ingress", answers),
+            ("asked", "query", "egress", answers),
+            ("replies", "reply", "ingress", answers),
         ]
-        if asks:
-            found.append(_rule(f"{user}-asks", ["query"], ["ingress"], asks))
-            found.append(_rule(f"{user}-answered", ["reply"], ["egress"], asks))
-            found.append(
-                _rule(f"{user}-finds", ["declare_queryable"], ["egress"], asks)
-            )
-        if answers:
-            found.append(
-                _rule(f"{user}-offers", ["declare_queryable"], ["ingress"], answers)
-            )
-            found.append(_rule(f"{user}-asked", ["query"], ["egress"], answers))
-            found.append(_rule(f"{user}-replies", ["reply"], ["ingress"], answers))
+        found = [
+            {
+                "id": f"{user}-{what}",
+                "messages": [message],
+                "flows": [flow],
+                "permission": "allow",
+                "key_exprs": keys,
+            }
+            for what, message, flow, keys in rows
+            if keys
+        ]
         rules += found
         policies.append({"rules": [rule["id"] for rule in found], "subjects": [user]})
     return {
@@ -254,18 +259,6 @@ def access_rules(users: Mapping[str, UserEntry]) -> dict[str, Any]:
         "rules": rules,
         "subjects": [{"id": user, "usernames": [user]} for user in users],
         "policies": policies,
-    }
-
-
-def _rule(
-    id: str, messages: list[str], flows: list[str], keys: list[str]
-) -> dict[str, Any]:
-    return {
-        "id": id,
-        "messages": messages,
-        "flows": flows,
-        "permission": "allow",
-        "key_exprs": keys,
     }
 
 

@@ -2,7 +2,7 @@
 
 import math
 import time
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from webmap import html, svg
 from webmap.base.geometry import Twist
@@ -212,30 +212,6 @@ A failed goal is shown until the next goal.
 """
 
 
-class GoalOnCard(Protocol):
-    """The part of a robot's report about its goal that this module needs."""
-
-    @property
-    def state(self) -> str:
-        """A key of ``GOALS``, such as ``"under way"``."""
-
-    @property
-    def left(self) -> float | None:
-        """Remaining distance, in metres."""
-
-    @property
-    def eta(self) -> float | None:
-        """Remaining time, in seconds."""
-
-    @property
-    def time(self) -> float | None:
-        """Time since the goal began, in seconds."""
-
-    @property
-    def recoveries(self) -> int | None:
-        """Number of recoveries that the robot's navigation has run."""
-
-
 class GoalLine:
     """A line of the card: the state of the robot's goal, and the progress."""
 
@@ -262,12 +238,13 @@ class GoalLine:
         self._use.set(href=f"#goal-{shape}")
         self.element.set("data-tone", tone or None)
         self._words.text = f"{words}: {goal.why}" if goal.why else words
-        self._figures.text = figures(goal)
+        self._figures.text = figures(robot)
 
 
-def figures(goal: GoalOnCard) -> str:
-    """Return the figures of a goal in progress, with units."""
-    if goal.state not in ("under way", "cancelling"):
+def figures(robot: "Robot") -> str:
+    """Return the figures of the goal of a robot, with units; empty unless it drives."""
+    goal = None if robot.report is None else robot.report.goal
+    if goal is None or goal.state not in ("under way", "cancelling"):
         return ""
     parts = []
     if goal.left is not None:

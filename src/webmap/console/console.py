@@ -11,7 +11,7 @@ from webmap.features.incidents.incidents import Incidents
 from webmap.features.shift_log.hand_over import RobotNow
 
 if TYPE_CHECKING:
-    from webmap import Bridge, Page, Robot
+    from webmap import Bridge, Map, Page, Robot
 
 Factory: TypeAlias = str | Callable[..., Any]
 """The name of a module, or a callable that makes one."""
@@ -90,23 +90,21 @@ class Console:
     def add(self, robot: "Robot") -> None:
         """Show a robot on all open and future pages."""
         self.robots.append(robot)
-        for page in list(self._pages):
-            _show(robot, page)
+        for map in self._maps:
+            map.add_robot(robot)
 
     def remove(self, robot: "Robot") -> None:
         """Remove a robot from every page until a new pose of the robot arrives."""
         self._removed[robot] = time.monotonic()
-        for page in list(self._pages):
-            for map in page.maps:
-                map.remove_robot(robot)
+        for map in self._maps:
+            map.remove_robot(robot)
 
     def forget(self, robot: "Robot") -> None:
         """Remove a robot for good."""
         self.robots = [other for other in self.robots if other is not robot]
         self._removed.pop(robot, None)
-        for page in list(self._pages):
-            for map in page.maps:
-                map.remove_robot(robot)
+        for map in self._maps:
+            map.remove_robot(robot)
 
     def bring_back(self) -> None:
         """Show removed robots again from which a pose has arrived since the removal."""
@@ -114,8 +112,8 @@ class Console:
         for robot, since in list(self._removed.items()):
             if robot.hears_poses(now - since):
                 del self._removed[robot]
-                for page in list(self._pages):
-                    _show(robot, page)
+                for map in self._maps:
+                    map.add_robot(robot)
 
     def add_grid(self, bridge: "Bridge", topic: str, **options: Any) -> bool:
         """Show a map under the robots on all pages; a map shown before stays unchanged.
@@ -135,8 +133,8 @@ class Console:
         if "order" not in options and "palette" not in options:
             options["order"] = TOP - len(self.grids) / 100
         self.grids[bridge, topic] = options
-        for page in list(self._pages):
-            self._show_grids(page, only=(bridge, topic))
+        for map in self._maps:
+            self._show_grids(map, only=(bridge, topic))
         return True
 
     def add_image(
@@ -152,8 +150,8 @@ class Console:
             height: In metres.
         """
         self.images.append((file, x, y, width, height))
-        for page in list(self._pages):
-            _show_image(self.images[-1], page)
+        for map in self._maps:
+            map.add_image(*self.images[-1])
 
     def add_module(self, name: Factory, /, *args: Any, **options: Any) -> None:
         """Add a module to the map of every page.
@@ -164,8 +162,8 @@ class Console:
             **options: Keyword arguments for the constructor.
         """
         self._more.append((name, args, options))
-        for page in list(self._pages):
-            _add_module(name, args, options, page)
+        for map in self._maps:
+            _add_module(name, args, options, map)
 
     def add_module_once(self, name: Factory, /, *args: Any, **options: Any) -> bool:
         """Add a module to the map of every page, unless it was added before.
@@ -195,49 +193,42 @@ class Console:
     def opened(self, page: "Page") -> None:
         """Show everything that was added until now on a newly filled page."""
         self._pages.add(page)
-        for name, options in self._modules.items():
-            _add_module(name, (), options, page)
-        for made, args, options in self._more:
-            _add_module(made, args, options, page)
-        for image in self.images:
-            _show_image(image, page)
-        self._show_grids(page)
-        for robot in self.shown_robots():
-            _show(robot, page)
+        for map in page.maps:
+            for name, options in self._modules.items():
+                _add_module(name, (), options, map)
+            for made, args, options in self._more:
+                _add_module(made, args, options, map)
+            for image in self.images:
+                map.add_image(*image)
+            self._show_grids(map)
+            for robot in self.shown_robots():
+                map.add_robot(robot)
+
+    @property
+    def _maps(self) -> "list[Map]":
+        return [map for page in list(self._pages) for map in page.maps]
 
     def _show_grids(
-        self, page: "Page", *, only: "tuple[Bridge, str] | None" = None
+        self, map: "Map", *, only: "tuple[Bridge, str] | None" = None
     ) -> None:
         for (bridge, topic), options in self.grids.items():
             if only not in (None, (bridge, topic)):
                 continue
-            for map in page.maps:
-                grid = map.add_module("OccupancyGrid", bridge, topic, **options)
-                self._layers[bridge, topic] = grid.layer
+            grid = map.add_module("OccupancyGrid", bridge, topic, **options)
+            self._layers[bridge, topic] = grid.layer
         if len({bridge for bridge, _ in self.grids}) > 1:
             # The topic alone does not identify a map any more.
             for (bridge, topic), layer in self._layers.items():
                 layer.svg.set("data-layer", f"{topic} ({bridge.name})")
 
 
-def _show(robot: "Robot", page: "Page") -> None:
-    for map in page.maps:
-        map.add_robot(robot)
-
-
-def _show_image(image: tuple[str, float, float, float, float], page: "Page") -> None:
-    for map in page.maps:
-        map.add_image(*image)
-
-
 def _add_module(
-    name: Factory, args: tuple[Any, ...], options: dict[str, Any], page: "Page"
+    name: Factory, args: tuple[Any, ...], options: dict[str, Any], map: "Map"
 ) -> None:
-    for map in page.maps:
-        try:
-            map.add_module(name, *args, **options)
-        except ValueError as error:  # the file no longer exists
-            map.report_error(f"{name} is not shown: {error}")
+    try:
+        map.add_module(name, *args, **options)
+    except ValueError as error:  # the file no longer exists
+        map.report_error(f"{name} is not shown: {error}")
 
 
 def robot_now(robot: "Robot") -> RobotNow:

@@ -9,6 +9,7 @@ from urllib.parse import urlsplit
 import webmap
 from webmap.config.checks import Mistakes
 from webmap.config.fleet import read_fleet
+from webmap.config.motion import MotionConfig
 from webmap.config.robot import RobotConfig
 from webmap.config.toml_text import read_text, readable_secret
 from webmap.console import Console, make_robot
@@ -114,17 +115,8 @@ def moving_parts(config: RobotConfig) -> RobotConfig:
     base, tf = config.base_link, config.tf
     if tf is not None:
         base = Buffer().name(tf.base_frame or base, tf.namespace)
-    return RobotConfig(
-        name=config.name,
-        bridge=config.bridge,
-        base_link=base,
-        odometry=config.odometry,
-        alignment=config.alignment,
-        twist=config.twist,
-        move=config.move,
-        initial_pose=config.initial_pose,
-        scan_assist=config.scan_assist,
-    )
+    kept = ("name", "bridge", "odometry", "alignment", *MotionConfig.__struct_fields__)
+    return RobotConfig(base_link=base, **{key: getattr(config, key) for key in kept})
 
 
 def open_addresses(url: str) -> list[str] | None:

@@ -273,14 +273,10 @@ def check_picture(
 
     """
     if media_type.startswith("image/svg"):
-        _check_svg(file, data)
+        if b"<svg" not in data[: 1 << 16]:
+            raise ConfigError(f"{str(file)!r} is not an SVG: it has no element <svg>")
     else:
         _check_pixels(file, data, most_pixels)
-
-
-def _check_svg(file: Path, data: bytes) -> None:
-    if b"<svg" not in data[: 1 << 16]:
-        raise ConfigError(f"{str(file)!r} is not an SVG: it has no element <svg>")
 
 
 def _check_pixels(file: Path, data: bytes, most_pixels: int) -> None:

@@ -1,10 +1,12 @@
 """``webmap.page``, ``run``, ``start``, ``stop``, ``call`` and ``asgi_app``."""
 
+import functools
+import inspect
 import logging
 from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import ExitStack, asynccontextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ParamSpec
 
 from webmap.base.errors import ConfigError, WebMapError
 from webmap.core.page import site
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     from webmap.server.open_pages import GateConnection
 
 log = logging.getLogger("webmap")
+
+P = ParamSpec("P")
 
 page = site.page
 
@@ -107,6 +111,20 @@ def asgi_app(
     return _make_app(Settings(**settings), with_lifespan=True)
 
 
+def _after_command_line(fn: Callable[P, None]) -> Callable[P, None]:
+    """Call a function with the options of the command line in place of its own."""
+
+    @functools.wraps(fn)
+    def call(*args: P.args, **options: P.kwargs) -> None:
+        global has_run
+        has_run = True
+        given = inspect.signature(fn).bind(*args, **options).arguments
+        fn(**{**given, **command_line})  # type: ignore[call-arg]
+
+    return call
+
+
+@_after_command_line
 def run(
     host: str = "127.0.0.1",
     port: int = 8080,
@@ -167,46 +185,6 @@ def run(
             certificate cannot be used.
 
     """
-    # All arguments; those of the command line come before them.
-    options = {**locals(), **command_line}
-    global has_run
-    has_run = True
-    _serve(**options)
-
-
-def _checked_pages(number: int) -> int:
-    if number < 1:
-        raise ConfigError(f"max_pages must be at least 1, got {number}")
-    return number
-
-
-def _checked_rate(rate: float) -> float:
-    if not 1.0 <= rate <= FRAME_RATE:
-        raise ConfigError(f"frame_rate must be from 1 to {FRAME_RATE:g}, got {rate:g}")
-    return rate
-
-
-def _serve(
-    *,
-    host: str,
-    port: int,
-    open_browser: bool,
-    tls: bool,
-    tls_cert: str | Path,
-    tls_key: str | Path,
-    insecure_lan: bool,
-    public_url: str,
-    trusted_proxies: Iterable[str],
-    proxy_user_header: str,
-    proxy_groups_header: str,
-    proxy_roles: Iterable[str],
-    sign_out_url: str,
-    embed_from: Iterable[str],
-    embed_driving: bool,
-    token: str | None,
-    max_pages: int,
-    frame_rate: float,
-) -> None:
     from webmap.base.tls import Renewal, tls_files
     from webmap.gate.locks import state_folder
     from webmap.server.access import Settings
@@ -290,6 +268,18 @@ def _serve(
         browser.close()
         runtime.stop()
         listener.close()
+
+
+def _checked_pages(number: int) -> int:
+    if number < 1:
+        raise ConfigError(f"max_pages must be at least 1, got {number}")
+    return number
+
+
+def _checked_rate(rate: float) -> float:
+    if not 1.0 <= rate <= FRAME_RATE:
+        raise ConfigError(f"frame_rate must be from 1 to {FRAME_RATE:g}, got {rate:g}")
+    return rate
 
 
 def _make_app(settings: Any, *, with_lifespan: bool) -> "WebApp":

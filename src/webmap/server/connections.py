@@ -18,6 +18,8 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import (
     WebSocketsSansIOProtocol,
 )
 
+from webmap.server.origins import ip_of
+
 log = logging.getLogger("webmap.server")
 
 WAITING_S = 10.0
@@ -107,13 +109,8 @@ def origin_of(address: str) -> str:
         Unix socket.
 
     """
-    try:
-        ip = ipaddress.ip_address(address.partition("%")[0])
-    except ValueError:
-        return ""
-    if isinstance(ip, ipaddress.IPv6Address) and ip.ipv4_mapped is not None:
-        ip = ip.ipv4_mapped
-    if ip.is_loopback:
+    ip = ip_of(address)
+    if ip is None or ip.is_loopback:
         return ""
     if ip.version == 6:
         return str(ipaddress.ip_network((ip, 64), strict=False))

@@ -73,6 +73,19 @@ def is_loopback(host: str) -> bool:
         return False
 
 
+def ip_of(text: str) -> ipaddress.IPv4Address | ipaddress.IPv6Address | None:
+    """Return the IP address in a text, without its zone; None if it is none.
+
+    An IPv4 address in the form of IPv6 (``::ffff:192.0.2.1``) counts as IPv4.
+    """
+    try:
+        found = ipaddress.ip_address(text.partition("%")[0])
+    except ValueError:
+        return None
+    mapped = found.ipv4_mapped if isinstance(found, ipaddress.IPv6Address) else None
+    return mapped or found
+
+
 def same_origin(origin: str | None, *, secure: bool, host: str) -> bool:
     """Return whether an Origin header is the exact origin that a request was sent to.
 

@@ -20,7 +20,7 @@ from starlette.types import Scope
 from webmap.base.errors import ConfigError
 from webmap.base.roles import ALL_ROBOTS, Role, checked_patterns
 from webmap.core.operators import MOST_NAME, RESERVED, Viewer, likeness, plain_name
-from webmap.server.origins import checked_origin, same_origin
+from webmap.server.origins import checked_origin, ip_of, same_origin
 
 log = logging.getLogger("webmap.server")
 
@@ -94,13 +94,8 @@ class Proxies:
 
     def trusts(self, address: str) -> bool:
         """Return whether headers of a connection from an address count."""
-        try:
-            ip = ipaddress.ip_address(address.partition("%")[0])
-        except ValueError:
-            return False
-        if isinstance(ip, ipaddress.IPv6Address):
-            ip = ip.ipv4_mapped or ip
-        return any(ip in network for network in self.trusted)
+        ip = ip_of(address)
+        return ip is not None and any(ip in network for network in self.trusted)
 
     def seen(self, scope: Scope) -> Scope:
         """Return the scope of a request as the browser sees it."""
@@ -132,8 +127,9 @@ class Proxies:
         hops = [hop.strip() for hop in ",".join(lists).split(",")]
         # The client states the first ones, and each proxy adds one at the end.
         client = next((hop for hop in reversed(hops) if not self.trusts(hop)), "")
-        if _is_address(client):
-            scope["client"] = (client, 0)
+        ip = ip_of(client)
+        if ip is not None:
+            scope["client"] = (str(ip), 0)
         base = next(filter(None, (_only(headers, name) for name in _PREFIXES)), "")
         return base.rstrip("/") if _BASE.fullmatch(base.rstrip("/")) else ""
 
@@ -147,14 +143,6 @@ def _only(headers: Iterable[tuple[bytes, bytes]], name: bytes) -> str:
     """Return the value of a header; empty if there are several."""
     values = [value.decode("latin-1").strip() for key, value in headers if key == name]
     return values[0] if len(values) == 1 and "," not in values[0] else ""
-
-
-def _is_address(text: str) -> bool:
-    try:
-        ipaddress.ip_address(text)
-    except ValueError:
-        return False
-    return True
 
 
 @dataclass(frozen=True, slots=True)

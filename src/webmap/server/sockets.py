@@ -14,7 +14,6 @@ shows the camera. The page answers each picture with the number of those that it
 received, so that a late page skips to the next key picture.
 """
 
-import ipaddress
 import logging
 import secrets
 import time
@@ -35,6 +34,7 @@ from webmap.gate.commands import begins_like_stop, op_of, parse, stop_in
 from webmap.gate.display.pages import refused_text
 from webmap.gate.protocol import Identity, Refused
 from webmap.server.open_pages import GateConnection, OpenPages
+from webmap.server.origins import ip_of
 from webmap.server.outbox import (
     BatchedCallsByLoop,
     DriveQueue,
@@ -77,12 +77,9 @@ def place_of(socket: WebSocket) -> str:
     the computer of whoever reads it.
     """
     host = socket.client.host if socket.client else ""
-    try:
-        address = ipaddress.ip_address(host.partition("%")[0])
-    except ValueError:  # such as a Unix socket
+    address = ip_of(host)
+    if address is None:  # such as a Unix socket
         return ""
-    if isinstance(address, ipaddress.IPv6Address):
-        address = address.ipv4_mapped or address
     if not address.is_loopback:
         return str(address)
     proxied = "x-forwarded-for" in socket.headers or "forwarded" in socket.headers

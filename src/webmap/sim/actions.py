@@ -6,7 +6,7 @@ from typing import Any
 
 from webmap.ros.rosbridge.server.encode import Publication
 from webmap.ros.rosbridge.server.graph import GoalHandle, Respond
-from webmap.sim.messages import GraphNode
+from webmap.sim.messages import NODE, GraphNode
 from webmap.sim.navigator import GoalState, SimGoal
 
 _ACTIONLIB_STATUS = {
@@ -44,25 +44,17 @@ class ActionlibServer:
 
     def start(self) -> None:
         """Advertise and subscribe to the topics."""
-        graph, owner, name = self.node.graph, self.node, "/robots"
-        kind = "move_base_msgs/MoveBaseAction"
+        node, kind = self.node, "move_base_msgs/MoveBaseAction"
         for part, type_name in (
             ("status", "actionlib_msgs/GoalStatusArray"),
             ("result", f"{kind}Result"),
             ("feedback", f"{kind}Feedback"),
         ):
-            graph.advertise(owner, f"{self.topic}/{part}", type_name, node=name)
-        graph.subscribe(
-            owner, f"{self.topic}/goal", self._on_goal, f"{kind}Goal", node=name
-        )
-        graph.subscribe(
-            owner,
-            f"{self.topic}/cancel",
-            self._on_cancel,
-            "actionlib_msgs/GoalID",
-            node=name,
-        )
-        self.node.on_step.append(self.publish_status)
+            node.advertise(f"{self.topic}/{part}", type_name)
+        node.subscribe(f"{self.topic}/goal", f"{kind}Goal", self._on_goal)
+        cancel = f"{self.topic}/cancel"
+        node.subscribe(cancel, "actionlib_msgs/GoalID", self._on_cancel)
+        node.on_step.append(self.publish_status)
 
     def publish_status(self) -> None:
         """Publish the status of the goals, and the feedback of the active one."""
@@ -180,14 +172,10 @@ class NavigateToPose:
             f"{self.action}/_action/cancel_goal",
             "action_msgs/CancelGoal",
             self._on_cancel,
-            node="/robots",
+            node=NODE,
         )
-        self.node.graph.advertise(
-            self.node,
-            f"{self.action}/_action/feedback",
-            f"{self.type}_FeedbackMessage",
-            node="/robots",
-        )
+        feedback = f"{self.action}/_action/feedback"
+        self.node.advertise(feedback, f"{self.type}_FeedbackMessage")
         self.node.on_step.append(self._publish_feedback)
 
     def send_goal(

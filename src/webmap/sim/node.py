@@ -1,6 +1,7 @@
 """The ROS node of the simulated robots: the world on one side, topics on the other."""
 
 import logging
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -16,8 +17,9 @@ from webmap.sim.feeds.sensors import (
     SONAR_FRAME,
     SONAR_POSE,
 )
-from webmap.sim.messages import NODE, GraphNode
+from webmap.sim.messages import NODE, GraphNode, Message
 from webmap.sim.navigator import SimGoal
+from webmap.sim.robot import SimRobot
 from webmap.sim.scanner import OVER, mount, overhead
 from webmap.sim.world import World
 
@@ -135,7 +137,7 @@ class RobotsNode(GraphNode):
             self._publish_views()
         slow = self._steps % _SLOW_EVERY == 0
         if slow:
-            self._publish_batteries()
+            self._publish_each("battery_state", self.messages.battery)
         self._publish_paths(all_of_them=slow)
         if self._feeds is not None:
             self._feeds.publish(self._steps)
@@ -180,13 +182,9 @@ class RobotsNode(GraphNode):
         self.publish("/tf_static", transforms)
 
     def _publish_poses(self) -> None:
-        now = self.graph.clock()
-        for robot in self.world.robots:
-            topic = f"{robot.topics}/odom"
-            if self.graph.is_wanted(topic):
-                self.publish(topic, self.messages.odometry(topic, now, robot))
+        self._publish_each("odom", self.messages.odometry)
         if self.graph.is_wanted("/tf"):
-            robots = self.world.robots
+            now, robots = self.graph.clock(), self.world.robots
             believed = [self.believed(index) for index in range(len(robots))]
             message = self.messages.transforms("/tf", now, robots, believed)
             self.publish("/tf", message)
@@ -218,12 +216,14 @@ class RobotsNode(GraphNode):
                 now = self.graph.clock()
                 self.publish(topic, self.messages.camera(topic, now, robot, jpeg))
 
-    def _publish_batteries(self) -> None:
+    def _publish_each(
+        self, name: str, make: Callable[[str, float, SimRobot], Message]
+    ) -> None:
         now = self.graph.clock()
         for robot in self.world.robots:
-            topic = f"{robot.topics}/battery_state"
+            topic = f"{robot.topics}/{name}"
             if self.graph.is_wanted(topic):
-                self.publish(topic, self.messages.battery(topic, now, robot))
+                self.publish(topic, make(topic, now, robot))
 
     def _publish_paths(self, *, all_of_them: bool) -> None:
         for i, navigator in enumerate(self.world.navigators):

@@ -216,7 +216,10 @@ async def run(bridge: Bridge, spec: ButtonConfig, values: Any) -> str:
     try:
         await _refuse_motion(bridge, spec)
         if spec.kind == "service":
-            return await _call(bridge, spec, values)
+            answer = await bridge.call_service(
+                spec.name, values, type=spec.type, timeout=spec.timeout
+            )
+            return answer_text(answer)
         if spec.kind == "topic":
             bridge.publish(spec.name, values, spec.type)
             return "Published"
@@ -256,13 +259,6 @@ async def _type_on_robot(bridge: Bridge, spec: ButtonConfig) -> str | None:
     if spec.kind == "parameter":
         return None
     return await bridge.service_type(spec.name)
-
-
-async def _call(bridge: Bridge, spec: ButtonConfig, values: Mapping[str, Any]) -> str:
-    answer = await bridge.call_service(
-        spec.name, values, type=spec.type, timeout=spec.timeout
-    )
-    return answer_text(answer)
 
 
 async def _set_ros1(bridge: Bridge, spec: ButtonConfig, value: Any) -> str:

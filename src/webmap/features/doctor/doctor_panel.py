@@ -337,10 +337,7 @@ _checkups: "weakref.WeakKeyDictionary[Bridge, Checkup]" = weakref.WeakKeyDiction
 
 def checkup_of(bridge: "Bridge") -> Checkup:
     """Return the check of a bridge, shared by all pages."""
-    found = _checkups.get(bridge)
-    if found is None:
-        found = _checkups[bridge] = Checkup(bridge.url)
-    return found
+    return _checkups.setdefault(bridge, Checkup(bridge.url))
 
 
 MAY_TRY = ("operator", "admin")

@@ -228,10 +228,7 @@ _logs: "weakref.WeakKeyDictionary[Bridge, BridgeLog]" = weakref.WeakKeyDictionar
 
 def log_of(bridge: Bridge) -> BridgeLog:
     """Return the log of a bridge, shared by all pages."""
-    found = _logs.get(bridge)
-    if found is None:
-        found = _logs[bridge] = BridgeLog(bridge)
-    return found
+    return _logs.setdefault(bridge, BridgeLog(bridge))
 
 
 PERIOD = 0.25
