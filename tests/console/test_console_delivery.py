@@ -175,11 +175,14 @@ def test_the_first_picture_comes_without_a_message_of_the_page(opened: Opened) -
     assert opened.again.asked == []
 
 
-def test_the_first_picture_comes_while_the_page_still_loads(demo, chromium) -> None:
+@pytest.mark.parametrize("late", [r"/web/page\.js", r"/console/console\.css"])
+def test_the_first_picture_comes_while_the_page_still_loads(
+    demo, chromium, late
+) -> None:
     context = chromium.new_context(viewport={"width": 1280, "height": 800})
     page = context.new_page()
     held: list[Route] = []
-    page.route(re.compile(r"/web/page\.js"), lambda route: held.append(route))
+    page.route(re.compile(late), lambda route: held.append(route))
     with page.expect_websocket() as scene:
         page.goto(demo.url, wait_until="commit")
     with scene.value.expect_event("framereceived"):

@@ -9,6 +9,9 @@ from hypothesis import strategies as st
 from webmap import Map, Robot, svg
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Vector3
+from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer
+from webmap.core.page import Page
 from webmap.core.world_view import Rect, apply_operation, initial_view
 
 POINTS = st.floats(-2000, 2000)
@@ -25,6 +28,17 @@ def test_a_map_without_a_size_has_the_size_of_its_container(container):
     map = Map(container)
     assert (map.canvas_width, map.canvas_height) == (700, 500)
     assert (map.get_bounding_rect().width, map.get_bounding_rect().height) == (700, 500)
+
+
+def test_a_container_of_which_the_page_knows_no_size_has_that_of_the_window(
+    channel, publisher, tmp_path
+):
+    entry = PageEntry("/", lambda page: None, None, tmp_path, "test")
+    page = Page(entry, channel, Viewer("v1", "Ann"), publisher, {}, (1280, 800))
+    with page.scope.active():
+        map = Map(page.element("map"))
+    assert (map.canvas_width, map.canvas_height) == (1280, 800)
+    page.close()
 
 
 def test_the_view_of_the_tutorial_shows_the_whole_background(container):

@@ -22,7 +22,8 @@ def test_a_made_page_has_one_container_and_an_escaped_title():
     text = make_page("A <b>", base_from("/"))
     assert '<div id="webmap_container"></div>' in text
     assert "<title>A &lt;b&gt;</title>" in text
-    assert text.count(SCRIPT) == text.count(PRELOADS) == 1
+    early = SCRIPT.replace('<script type="module"', '<script type="module" async', 1)
+    assert text.count(early) == text.count(PRELOADS) == 1
     assert prepare_page(text, base_from("/")).blocked == []
 
 
@@ -95,6 +96,14 @@ def test_files_that_the_html_already_loads_are_not_added_again():
     )
     own = prepare_page(text, base_from("/")).text
     assert own == text.replace("<head>", f"<head>{PRELOADS}")
+
+
+def test_a_page_may_open_its_socket_before_its_style_sheets_are_there():
+    early = '<script type="module" async src="_webmap/web/opening.js"></script>'
+    text = f"<head>{early}</head>"
+    _, page = SCRIPT.split("</script>", 1)
+    own = prepare_page(text, base_from("/")).text
+    assert own == f"<head>{SHEET}{early}{page}{ICON}</head>"
 
 
 def test_own_files_of_webmap_that_the_html_loads_get_the_address_of_their_version():

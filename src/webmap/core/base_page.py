@@ -94,6 +94,7 @@ class BasePage:
         viewer: Viewer,
         publisher: Publisher,
         sizes: Mapping[str, tuple[float, float]],
+        window: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         self.entry = entry
         self.channel = channel
@@ -103,7 +104,7 @@ class BasePage:
         self.scope = Scope(f"page {entry.path}", lambda text, _: self.notice(text))
         self.closed = False
         self.publisher = publisher
-        self._sizes = dict(sizes)
+        self._sizes, self._window = dict(sizes), window
         self._document = Document()
         self.fragment = Fragment(self._document)
         self.mount = channel.mount(self.fragment, under=0)
@@ -125,10 +126,14 @@ class BasePage:
         return self._document.bind(id)
 
     def size_of(self, container: Element) -> tuple[float, float]:
-        """Return the size in pixels that a container had when the page opened."""
+        """Return the width and height that a container had when the page opened.
+
+        In pixels. That of the window if the page did not show the container, or did not
+        know the size yet: the console and generated pages open their sockets before.
+        """
         if isinstance(container, BoundElement):
-            return self._sizes.get(container.html_id, (0.0, 0.0))
-        return (0.0, 0.0)
+            return self._sizes.get(container.html_id, self._window)
+        return self._window
 
     def on_close(self, fn: Callable[[], object]) -> Removal:
         """Call ``fn`` when the page is closed permanently."""

@@ -81,15 +81,15 @@ def make_page(
         base=escape(base),
         key=_for_script(key, marks),
         preloads=_preloads(base),
-        scripts=_scripts(base),
+        scripts=_script(base, STARTS[0], "async ") + _script(base, STARTS[1]),
     )
 
 
 def _preloads(base: str) -> str:
     """Return the elements with which a browser loads bundles at once, not in turn.
 
-    First those of the picture, with the style sheets. When these are there, opening.js
-    makes the browser load the others.
+    First those of the picture, with the style sheets. When opening.js runs, it makes
+    the browser load the others.
     """
     return "".join(
         f'<link rel="{rel}" href="{escape(base)}{name}">'
@@ -98,12 +98,13 @@ def _preloads(base: str) -> str:
     )
 
 
-def _scripts(base: str) -> str:
-    """Return the elements that start the page, first the module with its socket."""
-    return "".join(
-        f'<script type="module" src="{escape(base)}{name}"></script>'
-        for name in STARTS[:2]
-    )
+def _script(base: str, name: str, when: str = "") -> str:
+    """Return an element that runs a module when the style sheets are there, or async.
+
+    ``web/opening.js`` runs async where the display may take the size of the window for
+    that of the map: its socket then opens before the style sheets are there.
+    """
+    return f'<script type="module" {when}src="{escape(base)}{name}"></script>'
 
 
 def _for_script(key: str | None, marks: Iterable[str]) -> str:
@@ -139,7 +140,7 @@ def prepare_page(
         first += f'<link rel="stylesheet" href="{escape(base)}web/webmap.css">'
     first += _preloads(base)
     if not seen.has("web/page.js"):
-        last = _scripts(base)
+        last = "".join(_script(base, name) for name in STARTS[:2] if not seen.has(name))
     if not seen.icon:
         last += f'<link rel="icon" href="{escape(base)}icon.svg" type="image/svg+xml">'
     start, end = seen.head()

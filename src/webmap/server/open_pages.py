@@ -62,9 +62,6 @@ SAME = (
 DONE = ("click", "change")
 """The events whose answer the operator waits for: the page gets a frame at once."""
 
-Sizes = Mapping[str, tuple[float, float]]
-"""The sizes of a page's containers, in pixels."""
-
 PageKey = tuple[str, str, str]
 """The path of a page, the page's own identifier, and its viewer's."""
 
@@ -158,8 +155,8 @@ class PageHost:
 
     def _receive(self, event: PageEvent) -> None:
         match event:
-            case PageHello(containers=sizes):
-                self._hello(sizes)
+            case PageHello():
+                self._hello(event)
             case ElementEvent():
                 self._element_event(event)
             case ViewReport():
@@ -201,16 +198,16 @@ class PageHost:
 
     # From the page.
 
-    def _hello(self, sizes: Sizes) -> None:
+    def _hello(self, hello: PageHello) -> None:
         self._session.restart()
         if self._page is None:
-            self._pages.build_soon(self, sizes)
+            self._pages.build_soon(self, hello)
         else:
             self._show()
 
-    def build(self, sizes: Sizes) -> None:
+    def build(self, hello: PageHello) -> None:
         """Call the page's function, and send the first frame at once."""
-        self._open(sizes)
+        self._open(hello)
         self._show()
 
     def _show(self) -> None:
@@ -268,9 +265,14 @@ class PageHost:
             raise MotionError("the goal was not sent: the page is not connected")
         self.drive.move(robot, x, y, yaw)
 
-    def _open(self, sizes: Sizes) -> None:
+    def _open(self, hello: PageHello) -> None:
         page = self._page = Page(
-            self._entry, self._session, self.viewer, self._pages.publisher, sizes
+            self._entry,
+            self._session,
+            self.viewer,
+            self._pages.publisher,
+            hello.containers,
+            (hello.width, hello.height),
         )
         page.on_speeds = lambda v, w: self.send_speeds()
         page.on_move = self._move
@@ -371,7 +373,7 @@ class OpenPages:
         self.publisher = publisher
         self._max_pages = max_pages
         self._hosts: dict[PageKey, PageHost] = {}
-        self._unbuilt: dict[str, dict[PageHost, Sizes]] = {}
+        self._unbuilt: dict[str, dict[PageHost, PageHello]] = {}
         """The pages to build, by viewer; the viewer whose turn is next comes first."""
         self._closed = 0
         self._drives: dict[tuple[str, str], GateConnection] = {}
@@ -433,7 +435,7 @@ class OpenPages:
             del self._unbuilt[host.viewer.id]
         self._closed += built
 
-    def build_soon(self, host: PageHost, sizes: Sizes) -> None:
+    def build_soon(self, host: PageHost, hello: PageHello) -> None:
         """Build a page when it is the turn of its viewer.
 
         One page is built at a time, and the viewers take turns. Between two pages the
@@ -441,7 +443,7 @@ class OpenPages:
         """
         if not self._unbuilt:
             asyncio.get_running_loop().call_soon(self._build_next)
-        self._unbuilt.setdefault(host.viewer.id, {})[host] = sizes
+        self._unbuilt.setdefault(host.viewer.id, {})[host] = hello
 
     def _build_next(self) -> None:
         if not self._unbuilt:
@@ -449,14 +451,14 @@ class OpenPages:
         viewer = next(iter(self._unbuilt))
         waiting = self._unbuilt.pop(viewer)
         host = next(iter(waiting))
-        sizes = waiting.pop(host)
+        hello = waiting.pop(host)
         if waiting:
             self._unbuilt[viewer] = waiting  # now the last
         if self._unbuilt:
             asyncio.get_running_loop().call_soon(self._build_next)
         # The objects of a page would make a collection due, which looks at all robots.
         self.freeze()
-        host.build(sizes)
+        host.build(hello)
 
     def built(self) -> None:
         """Except the objects of all pages from collections of garbage.

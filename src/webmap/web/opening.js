@@ -20,6 +20,12 @@ export const path = pagePath();
 /** The name that identifies this page, also after a reload. */
 export const id = takeIdentity(path);
 
+/**
+ * Whether the socket opens before the style sheets are there: the page knows no sizes
+ * yet, and the display takes the window's until the page reports its view.
+ */
+let early = document.querySelector('script[async][src$="/web/opening.js"]') !== null;
+
 /** Whether the viewer prefers dark colors. */
 export const dark = matchMedia("(prefers-color-scheme: dark)");
 
@@ -34,18 +40,19 @@ export function sceneAddress() {
     dpr: devicePixelRatio,
     theme: dark.matches ? "dark" : "light",
     gzip: "DecompressionStream" in globalThis,
-    containers: containers(),
+    containers: early ? {} : containers(),
   };
   return socketAddress("scene", { page: path, id, hello: JSON.stringify(hello) });
 }
 
-// It begins to open now.
+// It begins to open now. The page knows its sizes when it opens the next one.
 const socket = new WebSocket(sceneAddress(), protocols());
+early = false;
 socket.binaryType = "arraybuffer";
 /** @type {Array<{data: unknown, at: number}>} */
 const received = [];
 
-// The style sheets are there now: on a slow link, these modules would delay them.
+// On a slow link, these modules would delay this one, and the style sheets.
 for (const link of document.querySelectorAll(`link[rel="${NEXT}"]`)) {
   link.setAttribute("rel", "modulepreload");
 }
