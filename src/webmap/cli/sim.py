@@ -3,7 +3,7 @@
 import os
 import signal
 from pathlib import Path
-from typing import Literal
+from typing import Any
 
 import click
 from click.core import ParameterSource
@@ -34,7 +34,6 @@ from webmap.cli.options import PORT, Finite, simulator_options, verbose_option
 )
 @click.option(
     "--map",
-    "map_file",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="A floor plan in map_server's format (YAML); a building by default.",
 )
@@ -121,27 +120,14 @@ from webmap.cli.options import PORT, Finite, simulator_options, verbose_option
 @verbose_option
 def sim(
     robots: int | None,
-    port: int,
-    host: str,
-    seed: int,
-    map_file: Path | None,
-    dialect: Literal["ros1", "ros2"],
-    twist: Literal["Twist", "TwistStamped"],
-    robot_timeout: float,
-    drift: float,
-    nan: bool,
-    wander: bool,
-    errands: int,
-    low_battery: bool,
     flat: bool,
-    extras: bool,
-    tilted: bool,
+    robot_timeout: float,
     rosbridge: str | None,
     polite: bool,
     quirks: str | None,
     take_nan: bool,
-    http_camera: int | None,
     with_parent: bool,
+    **options: Any,
 ) -> None:
     """Simulate robots with laser scanners, behind a rosbridge.
 
@@ -165,26 +151,13 @@ def sim(
     asyncio.run(
         run_simulator(
             robots=robots or (1 if flat else 2),
-            port=port,
-            host=host,
-            seed=seed,
-            map=map_file,
-            dialect=dialect,
-            twist=twist,
-            robot_timeout=robot_timeout or None,
-            drift=drift,
-            nan=nan,
-            wander=wander,
-            errands=errands,
-            low_battery=low_battery,
             flat=flat,
-            extras=extras,
-            tilted=tilted,
+            robot_timeout=robot_timeout or None,
             rosbridge=rosbridge,
             quirks="polite" if polite else quirks or "real",
             refuse_nan=not take_nan,
-            http_camera=http_camera,
             on_http_camera=lambda url: echo(f"cameras are at {url}", err=True),
             on_ready=lambda url: echo(f"rosbridge is ready at {url}"),
+            **options,  # they have the names of its arguments
         )
     )
