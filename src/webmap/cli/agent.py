@@ -8,6 +8,7 @@ from webmap.base.echo import echo
 from webmap.cli.options import (
     Finite,
     bridge_argument,
+    stops_within_option,
     tls_options,
     verbose_option,
 )
@@ -39,12 +40,7 @@ from webmap.cli.options import (
     metavar="ROBOT.ROLE=TOPIC",
     help="Replace a guessed topic, as in webmap view. May be repeated.",
 )
-@click.option(
-    "--stops-within",
-    type=Finite(0.0, min_open=True),
-    help="Command timeout: seconds after which every base stops by itself when "
-    "commands end. Without it, the limits are 0.3 m/s and 0.6 rad/s.",
-)
+@stops_within_option
 @click.option(
     "--drive-without-proof",
     is_flag=True,

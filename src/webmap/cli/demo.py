@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn
 from urllib.parse import urlsplit
 
 import click
@@ -16,15 +16,13 @@ from webmap.base.echo import echo
 from webmap.base.errors import ConfigError
 from webmap.base.processes import GRACE, child_process
 from webmap.cli.demo_robots import FREE, demo_robot
-from webmap.cli.options import PORT, Finite, simulator_options, web_options
+from webmap.cli.options import PORT, Finite, simulator_options, together, web_options
 
 if TYPE_CHECKING:
     from webmap import Bridge
     from webmap.console.console import Console
     from webmap.testing.fault_proxy import FaultProxy
 
-
-F = TypeVar("F", bound=Callable[..., Any])
 
 STALL_EVERY = 20.0
 """Seconds from the start of a stall to the start of the next one."""
@@ -36,34 +34,31 @@ LONGEST_STALL = 10.0
 """Greatest length of a stall, in seconds."""
 
 
-def bad_link_options(command: F) -> F:
-    """Add ``--delay``, ``--jitter`` and ``--stall`` to a command (decorator)."""
-    for option in (
-        click.option(
-            "--stall",
-            type=Finite(0.0, LONGEST_STALL),
-            default=0.0,
-            metavar="SECONDS",
-            help=f"Every {STALL_EVERY:g} s, let the link to the robots carry nothing "
-            f"for this long; at most {LONGEST_STALL:g}.",
-        ),
-        click.option(
-            "--jitter",
-            type=Finite(0.0, LONGEST_DELAY),
-            default=0.0,
-            metavar="MS",
-            help="Delay messages by up to this many milliseconds more, at random.",
-        ),
-        click.option(
-            "--delay",
-            type=Finite(0.0, LONGEST_DELAY),
-            default=0.0,
-            metavar="MS",
-            help="Delay the link to the robots by this many milliseconds each way.",
-        ),
-    ):
-        command = option(command)
-    return command
+bad_link_options = together(
+    click.option(
+        "--stall",
+        type=Finite(0.0, LONGEST_STALL),
+        default=0.0,
+        metavar="SECONDS",
+        help=f"Every {STALL_EVERY:g} s, let the link to the robots carry nothing "
+        f"for this long; at most {LONGEST_STALL:g}.",
+    ),
+    click.option(
+        "--jitter",
+        type=Finite(0.0, LONGEST_DELAY),
+        default=0.0,
+        metavar="MS",
+        help="Delay messages by up to this many milliseconds more, at random.",
+    ),
+    click.option(
+        "--delay",
+        type=Finite(0.0, LONGEST_DELAY),
+        default=0.0,
+        metavar="MS",
+        help="Delay the link to the robots by this many milliseconds each way.",
+    ),
+)
+"""The options ``--delay``, ``--jitter`` and ``--stall``."""
 
 
 @contextmanager

@@ -57,87 +57,90 @@ wait_option = click.option(
 """How long a command waits for a rosbridge, as an option."""
 
 
-def tls_options(command: F) -> F:
-    """Add the options of a server with TLS: its own certificate, or a given one."""
-    for option in (
-        click.option(
-            "--tls-key",
-            type=click.Path(dir_okay=False),
-            default="",
-            help="The file with the private key of --tls-cert.",
-        ),
-        click.option(
-            "--tls-cert",
-            type=click.Path(dir_okay=False),
-            default="",
-            help="Use TLS with the certificate in this file.",
-        ),
-        click.option(
-            "--tls",
-            is_flag=True,
-            help="Use TLS with a certificate that WebMap makes.",
-        ),
-    ):
-        command = option(command)
-    return command
+def together(*options: Callable[[Any], Any]) -> Callable[[F], F]:
+    """Return a decorator that adds several options; help lists the last one first."""
+
+    def add(command: F) -> F:
+        return functools.reduce(lambda made, option: option(made), options, command)
+
+    return add
 
 
-def proxy_options(command: F) -> F:
-    """Add the options of a server behind a proxy, or in a frame of another page."""
-    for option in (
-        click.option(
-            "--embed-driving",
-            is_flag=True,
-            help="Let people drive there, not only look and stop.",
-        ),
-        click.option(
-            "--embed-from",
-            multiple=True,
-            metavar="ORIGIN",
-            help="Let pages of ORIGIN show WebMap in a frame; may be repeated.",
-        ),
-        click.option(
-            "--sign-out-url",
-            default="",
-            metavar="URL",
-            help="Where people sign out at the proxy.",
-        ),
-        click.option(
-            "--proxy-role",
-            "proxy_roles",
-            multiple=True,
-            metavar="GROUP=ROLE[:ROBOTS]",
-            help="What a group of the proxy may do, as 'drivers=operator:bay2/*' or "
-            "'*=viewer'; may be repeated, and a person's first one counts.",
-        ),
-        click.option(
-            "--proxy-groups-header",
-            default="",
-            metavar="NAME",
-            help="The header with the person's groups, with commas in between.",
-        ),
-        click.option(
-            "--proxy-user-header",
-            default="",
-            metavar="NAME",
-            help="The header in which a trusted proxy names who has signed in there.",
-        ),
-        click.option(
-            "--trusted-proxy",
-            "trusted_proxies",
-            multiple=True,
-            metavar="ADDRESS",
-            help="A proxy whose headers count; may be repeated.",
-        ),
-        click.option(
-            "--public-url",
-            default="",
-            metavar="URL",
-            help="The address of WebMap for browsers, behind a proxy.",
-        ),
-    ):
-        command = option(command)
-    return command
+tls_options = together(
+    click.option(
+        "--tls-key",
+        type=click.Path(dir_okay=False),
+        default="",
+        help="The file with the private key of --tls-cert.",
+    ),
+    click.option(
+        "--tls-cert",
+        type=click.Path(dir_okay=False),
+        default="",
+        help="Use TLS with the certificate in this file.",
+    ),
+    click.option(
+        "--tls",
+        is_flag=True,
+        help="Use TLS with a certificate that WebMap makes.",
+    ),
+)
+"""The options of a server with TLS: its own certificate, or a given one."""
+
+
+proxy_options = together(
+    click.option(
+        "--embed-driving",
+        is_flag=True,
+        help="Let people drive there, not only look and stop.",
+    ),
+    click.option(
+        "--embed-from",
+        multiple=True,
+        metavar="ORIGIN",
+        help="Let pages of ORIGIN show WebMap in a frame; may be repeated.",
+    ),
+    click.option(
+        "--sign-out-url",
+        default="",
+        metavar="URL",
+        help="Where people sign out at the proxy.",
+    ),
+    click.option(
+        "--proxy-role",
+        "proxy_roles",
+        multiple=True,
+        metavar="GROUP=ROLE[:ROBOTS]",
+        help="What a group of the proxy may do, as 'drivers=operator:bay2/*' or "
+        "'*=viewer'; may be repeated, and a person's first one counts.",
+    ),
+    click.option(
+        "--proxy-groups-header",
+        default="",
+        metavar="NAME",
+        help="The header with the person's groups, with commas in between.",
+    ),
+    click.option(
+        "--proxy-user-header",
+        default="",
+        metavar="NAME",
+        help="The header in which a trusted proxy names who has signed in there.",
+    ),
+    click.option(
+        "--trusted-proxy",
+        "trusted_proxies",
+        multiple=True,
+        metavar="ADDRESS",
+        help="A proxy whose headers count; may be repeated.",
+    ),
+    click.option(
+        "--public-url",
+        default="",
+        metavar="URL",
+        help="The address of WebMap for browsers, behind a proxy.",
+    ),
+)
+"""The options of a server behind a proxy, or in a frame of another page."""
 
 
 def web_options(command: F) -> F:
@@ -151,35 +154,7 @@ def web_options(command: F) -> F:
         web = {name: given.pop(name) for name in _WEB}
         return command(*args, web=web | {"open_browser": not no_browser}, **given)
 
-    for option in (
-        click.option(
-            "--insecure-lan",
-            is_flag=True,
-            help="Allow a --host that other machines reach, without TLS.",
-        ),
-        proxy_options,
-        tls_options,
-        click.option(
-            "--host",
-            default="127.0.0.1",
-            show_default=True,
-            help="Address that the web interface listens on.",
-        ),
-        click.option(
-            "--port",
-            "-p",
-            type=PORT,
-            default=8080,
-            show_default=True,
-            help="Port of the web interface; 0 lets the system choose.",
-        ),
-        click.option(
-            "--no-browser", is_flag=True, help="Do not open the page in a browser."
-        ),
-        verbose_option,
-    ):
-        with_web = option(with_web)
-    return cast(F, with_web)
+    return cast(F, _web_options(with_web))
 
 
 _WEB = (
@@ -199,6 +174,14 @@ _WEB = (
     "embed_driving",
 )
 
+
+stops_within_option = click.option(
+    "--stops-within",
+    type=Finite(0.0, min_open=True),
+    help="Command timeout: seconds after which every base stops by itself when "
+    "commands end. Without it, the limits are 0.3 m/s and 0.6 rad/s.",
+)
+"""The command timeout of the bases, as an option."""
 
 incidents_option = click.option(
     "--no-incidents",
@@ -223,6 +206,35 @@ verbose_option = click.option(
 )
 
 
+_web_options = together(
+    click.option(
+        "--insecure-lan",
+        is_flag=True,
+        help="Allow a --host that other machines reach, without TLS.",
+    ),
+    proxy_options,
+    tls_options,
+    click.option(
+        "--host",
+        default="127.0.0.1",
+        show_default=True,
+        help="Address that the web interface listens on.",
+    ),
+    click.option(
+        "--port",
+        "-p",
+        type=PORT,
+        default=8080,
+        show_default=True,
+        help="Port of the web interface; 0 lets the system choose.",
+    ),
+    click.option(
+        "--no-browser", is_flag=True, help="Do not open the page in a browser."
+    ),
+    verbose_option,
+)
+
+
 def simulator_options(*, robots: str, dialect: str) -> Callable[[F], F]:
     """Return a decorator that adds the number of robots, their start and the ROS.
 
@@ -231,29 +243,23 @@ def simulator_options(*, robots: str, dialect: str) -> Callable[[F], F]:
         dialect: Help text of ``--dialect``.
 
     """
-
-    def add(command: F) -> F:
-        for option in (
-            click.option(
-                "--dialect",
-                type=click.Choice(["ros1", "ros2"]),
-                default="ros1",
-                show_default=True,
-                help=dialect,
-            ),
-            click.option(
-                "--seed",
-                type=int,
-                default=1,
-                show_default=True,
-                help="Random seed of the start poses.",
-            ),
-            click.option("--robots", "-n", type=click.IntRange(1, 500), help=robots),
-        ):
-            command = option(command)
-        return command
-
-    return add
+    return together(
+        click.option(
+            "--dialect",
+            type=click.Choice(["ros1", "ros2"]),
+            default="ros1",
+            show_default=True,
+            help=dialect,
+        ),
+        click.option(
+            "--seed",
+            type=int,
+            default=1,
+            show_default=True,
+            help="Random seed of the start poses.",
+        ),
+        click.option("--robots", "-n", type=click.IntRange(1, 500), help=robots),
+    )
 
 
 # The option --topics.

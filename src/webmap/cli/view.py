@@ -10,6 +10,7 @@ from webmap.cli.options import (
     bridge_argument,
     incidents_option,
     one_bridge,
+    stops_within_option,
     topics_option,
     web_options,
 )
@@ -49,12 +50,7 @@ from webmap.cli.options import (
     help="Print the robots, their topics in use and their drawn topics, with reasons, "
     "and end.",
 )
-@click.option(
-    "--stops-within",
-    type=Finite(0.0, min_open=True),
-    help="Command timeout: seconds after which every base stops by itself when "
-    "commands end. Without it, the limits are 0.3 m/s and 0.6 rad/s.",
-)
+@stops_within_option
 @click.option(
     "--drive-without-proof",
     is_flag=True,
