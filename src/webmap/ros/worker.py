@@ -12,7 +12,6 @@ import signal
 import struct
 import sys
 from array import array
-from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from typing import Any, BinaryIO, get_args, get_type_hints
 
@@ -141,12 +140,8 @@ def _parts(message: Any) -> tuple[str | None, list[bytes]]:
     items = getattr(message, field)
     check_items(field, len(items))
     first = msgspec.structs.replace(message, **{field: items[:PIECE]})
-    return field, [_encode(first), *map(_encode, _slices(items))]
-
-
-def _slices(items: Sequence[Any]) -> Iterator[Sequence[Any]]:
-    for at in range(PIECE, len(items), PIECE):
-        yield items[at : at + PIECE]
+    others = (items[at : at + PIECE] for at in range(PIECE, len(items), PIECE))
+    return field, [_encode(first), *map(_encode, others)]
 
 
 def long_list(message: Any) -> str | None:
