@@ -145,11 +145,9 @@ class FaultProxy:
         return directions, server, server.sockets[0].getsockname()[1]
 
     def _choose(self, way: Way) -> list[Direction]:
-        return (
-            list(self._directions.values())
-            if way == "both"
-            else [self._directions[way]]
-        )
+        return [
+            each for name, each in self._directions.items() if way in (name, "both")
+        ]
 
     # Faults; each takes effect before the call returns.
 
