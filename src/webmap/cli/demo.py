@@ -7,7 +7,7 @@ from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from importlib.resources import as_file, files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 import click
@@ -172,13 +172,6 @@ USAGE = 2
 """Exit status of a command that has reported an error in one sentence."""
 
 
-def _give_up(status: int) -> NoReturn:
-    """End the command, with an error if the simulator has reported none."""
-    if status == USAGE:
-        sys.exit(USAGE)
-    raise ConfigError(f"the simulator ended with status {status} before it was ready")
-
-
 @contextmanager
 def starting_simulator(*arguments: object) -> Iterator[Callable[[], str]]:
     """Run ``webmap sim`` as a child process.
@@ -194,7 +187,12 @@ def starting_simulator(*arguments: object) -> Iterator[Callable[[], str]]:
 
         def url() -> str:
             if not started.line.startswith(READY):
-                _give_up(started.process.wait(GRACE))
+                status = started.process.wait(GRACE)
+                if status == USAGE:  # the simulator has reported an error
+                    sys.exit(USAGE)
+                raise ConfigError(
+                    f"the simulator ended with status {status} before it was ready"
+                )
             return started.line.removeprefix(READY).strip()
 
         yield url
@@ -264,14 +262,11 @@ def demo(
     """
     import webmap
 
-    def serve() -> None:
-        webmap.run(**web)
-
     if agents is not None:
         if bridge_port or robots:
             raise click.UsageError("--agents has one robot for each agent")
         with demo_of_agents(agents, dialect, seed):
-            serve()
+            webmap.run(**web)
         return
     number = robots or ROBOTS
     options = ["--robots", number, "--port", bridge_port, "--seed", seed]
@@ -288,7 +283,7 @@ def demo(
             bridges.append(webmap.Bridge(url, name="simulator"))
             for index in range(number):
                 opened.add(demo_robot(bridges[0], index, dialect, quiet=quiet))
-            serve()
+            webmap.run(**web)
 
 
 def _open_console(bridges: "list[Bridge]", floor: Path, *, quiet: bool) -> "Console":

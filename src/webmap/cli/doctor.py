@@ -122,10 +122,6 @@ def doctor(
     one_bridge([address for address, _, _ in bridges], topics)
     ready = True
     for number, (address, configured, trouble) in enumerate(bridges):
-
-        def waiting(why: str, address: str = address) -> None:
-            echo(f"Waiting for the bridge at {address}: {why}", err=True)
-
         seen = BridgeFacts(address, trouble=trouble)
         if not trouble:
             seen = asyncio.run(
@@ -137,7 +133,7 @@ def doctor(
                     try_call=try_call,
                     topics=topics,
                     configured=configured,
-                    waiting=waiting,
+                    waiting=waiting_for(f"the bridge at {address}"),
                 )
             )
         findings = judge(seen)

@@ -2,6 +2,7 @@
 
 import asyncio
 import functools
+import inspect
 import logging
 import math
 import re
@@ -146,33 +147,17 @@ proxy_options = together(
 def web_options(command: F) -> F:
     """Add the options of the web interface: its address, TLS and the browser.
 
-    The command gets them as ``web``, which are arguments of :func:`webmap.run`.
+    The command gets them as ``web``, which are arguments of :func:`webmap.run`: all
+    options that are no parameters of its own.
     """
+    own = inspect.signature(command).parameters
 
     @functools.wraps(command)
-    def with_web(*args: Any, no_browser: bool, **given: Any) -> Any:
-        web = {name: given.pop(name) for name in _WEB}
-        return command(*args, web=web | {"open_browser": not no_browser}, **given)
+    def with_web(*, no_browser: bool, **given: Any) -> Any:
+        mine = {name: given.pop(name) for name in own.keys() & given.keys()}
+        return command(**mine, web=given | {"open_browser": not no_browser})
 
     return cast(F, _web_options(with_web))
-
-
-_WEB = (
-    "host",
-    "port",
-    "tls",
-    "tls_cert",
-    "tls_key",
-    "insecure_lan",
-    "public_url",
-    "trusted_proxies",
-    "proxy_user_header",
-    "proxy_groups_header",
-    "proxy_roles",
-    "sign_out_url",
-    "embed_from",
-    "embed_driving",
-)
 
 
 stops_within_option = click.option(
