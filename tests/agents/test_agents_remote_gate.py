@@ -597,6 +597,12 @@ def test_an_agent_cannot_report_a_robot_or_a_person_by_another_name(connected):
     ]
 
 
+def test_the_texts_of_a_refused_count_are_cut(connected):
+    connected.receive(RefusedCount("A" * 1000, 3, "b" * 1000), 0.1)
+    (got,) = connected.owner.of(RefusedCount)
+    assert got.last == f"{'A' * 64}: {'b' * 300}"
+
+
 def test_a_robot_that_is_declared_later_is_reported_at_once(connected):
     late = declared(
         id="r3", name="Bob", bridge_url="zenoh://h/bay3", goal_topic="/goal"
