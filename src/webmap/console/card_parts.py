@@ -242,7 +242,7 @@ class GoalLine:
 
 
 def figures(robot: "Robot") -> str:
-    """Return the figures of the goal of a robot, with units; empty unless it drives."""
+    """Return the figures of the goal of a robot, with units; empty without progress."""
     goal = None if robot.report is None else robot.report.goal
     if goal is None or goal.state not in ("under way", "cancelling"):
         return ""

@@ -128,8 +128,9 @@ class BasePage:
     def size_of(self, container: Element) -> tuple[float, float]:
         """Return the width and height that a container had when the page opened.
 
-        In pixels. That of the window if the page did not show the container, or did not
-        know the size yet: the console and generated pages open their sockets before.
+        In pixels. If the page did not show the container, or did not know its size yet,
+        this is the size of the window: the console and generated pages connect before
+        their style sheets are there.
         """
         if isinstance(container, BoundElement):
             return self._sizes.get(container.html_id, self._window)

@@ -81,7 +81,7 @@ def make_page(
         base=escape(base),
         key=_for_script(key, marks),
         preloads=_preloads(base),
-        scripts=_script(base, STARTS[0], "async ") + _script(base, STARTS[1]),
+        scripts=_script(base, STARTS[0], early=True) + _script(base, STARTS[1]),
     )
 
 
@@ -98,12 +98,17 @@ def _preloads(base: str) -> str:
     )
 
 
-def _script(base: str, name: str, when: str = "") -> str:
-    """Return an element that runs a module when the style sheets are there, or async.
+def _script(base: str, name: str, *, early: bool = False) -> str:
+    """Return the element that runs a module.
 
-    ``web/opening.js`` runs async where the display may take the size of the window for
-    that of the map: its socket then opens before the style sheets are there.
+    Args:
+        base: The URL of WebMap's own files.
+        name: The module.
+        early: Whether it runs before the style sheets are there: ``web/opening.js``
+            does so on pages for which the window's size is near that of the map.
+
     """
+    when = "async " if early else ""
     return f'<script type="module" {when}src="{escape(base)}{name}"></script>'
 
 

@@ -45,7 +45,7 @@ export function sceneAddress() {
   return socketAddress("scene", { page: path, id, hello: JSON.stringify(hello) });
 }
 
-// It begins to open now. The page knows its sizes when it opens the next one.
+// It begins to open now. When the page opens another socket, it knows its sizes.
 const socket = new WebSocket(sceneAddress(), protocols());
 early = false;
 socket.binaryType = "arraybuffer";

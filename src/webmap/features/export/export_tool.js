@@ -72,7 +72,8 @@ class ExportTool {
  * @returns {string} A name that sorts by time and is valid on every system.
  */
 function fileName(now, ending) {
-  // Sweden writes 2026-01-31 12:00:00.
-  const [day, time] = now.toLocaleString("sv").split(" ");
-  return `webmap-${day}-${time.replaceAll(":", "")}.${ending}`;
+  const two = (/** @type {number} */ n) => String(n).padStart(2, "0");
+  const day = [now.getFullYear(), two(now.getMonth() + 1), two(now.getDate())].join("-");
+  const time = [now.getHours(), now.getMinutes(), now.getSeconds()].map(two).join("");
+  return `webmap-${day}-${time}.${ending}`;
 }
