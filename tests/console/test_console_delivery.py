@@ -208,7 +208,60 @@ def test_only_stop_and_driving_are_loaded_before_the_first_robot_is_shown(
 def test_stop_and_driving_do_not_wait_for_the_first_picture(opened: Opened) -> None:
     begun = {one.path for one in opened.before_robot()}
     files = f"/_webmap/v-{own_files.version()}/"
-    assert {files + name for name in STARTS} <= begun
+    # The HTML has the first bundle.
+    assert files + STARTS[0] not in begun
+    assert {files + name for name in STARTS[1:]} <= begun
+
+
+def test_the_second_picture_waits_until_driving_is_loaded(demo, chromium) -> None:
+    context = chromium.new_context(viewport={"width": 1280, "height": 800})
+    page = context.new_page()
+    held: list[Route] = []
+    page.route(re.compile("/web/drive\\.js"), lambda route: held.append(route))
+    sent: list[str] = []
+    page.on("websocket", lambda scene: scene.on("framesent", lambda t: sent.append(t)))
+    page.goto(demo.url)
+    page.locator(".robot:not(.unplaced)").first.wait_for(state="attached")
+    page.evaluate("() => new Promise((done) => setTimeout(done, 100))")
+    assert not [text for text in sent if '"seen"' in text]
+    held[0].continue_()
+    wait_for(lambda: [t for t in sent if '"seen"' in t], "an answer", 30.0, page)
+    context.close()
+
+
+def test_pictures_come_also_if_driving_cannot_be_loaded(demo, chromium) -> None:
+    context = chromium.new_context(viewport={"width": 1280, "height": 800})
+    page = context.new_page()
+    page.route(re.compile("/web/drive\\.js"), lambda route: None)  # never answered
+    sent: list[str] = []
+    page.on("websocket", lambda scene: scene.on("framesent", lambda t: sent.append(t)))
+    page.goto(demo.url)
+    wait_for(lambda: len([t for t in sent if '"seen"' in t]) > 3, "more", 30.0, page)
+    context.close()
+
+
+def test_a_page_works_if_a_proxy_forbids_the_script_in_the_html(demo, chromium) -> None:
+    context = chromium.new_context(viewport={"width": 1280, "height": 800})
+    # Chromium does not know that the answers of the test come from this machine.
+    context.grant_permissions(["local-network-access"])
+    page = context.new_page()
+
+    def forbid(route: Route) -> None:
+        answer = route.fetch()
+        policy = answer.headers["content-security-policy"]
+        strict = re.sub(" 'sha256-[^']*'", "", policy)
+        headers = {**answer.headers, "content-security-policy": strict}
+        route.fulfill(response=answer, headers=headers)
+
+    page.goto(demo.url)
+    page.route(lambda url: urlsplit(url).path == "/", forbid)
+    refused: list[str] = []
+    page.on("console", lambda message: refused.append(message.text))
+    page.reload()
+    page.locator(".robot:not(.unplaced)").first.wait_for(state="attached")
+    assert any("Content Security Policy" in text for text in refused)
+    wait_until_ready(page)
+    context.close()
 
 
 def test_the_whole_console_loads_each_file_once(opened: Opened) -> None:

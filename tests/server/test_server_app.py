@@ -1,4 +1,6 @@
+import base64
 import gzip
+import hashlib
 import logging
 import re
 import zlib
@@ -16,7 +18,8 @@ from webmap.core.shift_log import shift_log
 from webmap.server.access import Settings
 from webmap.server.app import RouteFor, WebApp
 from webmap.server.auth import Token
-from webmap.server.security import CONTENT_SECURITY_POLICY
+from webmap.server.own_files import own_files
+from webmap.server.security import CONTENT_SECURITY_POLICY, policy_with
 
 ORIGIN = {"origin": "http://127.0.0.1:8000"}
 PAGE_JS = 'src="{}_webmap/v-[0-9a-f]{{16}}/web/page.js"'
@@ -100,10 +103,14 @@ def test_every_answer_has_all_security_headers(app, client, stranger):
     assert {answer.status_code for answer in answers} == {
         200, 303, 401, 403, 404, 405, 421, 503,
     }  # fmt: skip
+    opening = own_files.opening()
     for answer in answers:
         headers = answer.headers
         policy = headers["content-security-policy"]
-        assert policy.startswith(CONTENT_SECURITY_POLICY)
+        if opening in answer.text:
+            assert policy == policy_with(opening)
+        else:
+            assert policy.startswith(CONTENT_SECURITY_POLICY)
         assert "unsafe" not in policy
         assert headers["x-content-type-options"] == "nosniff"
         assert headers["referrer-policy"] == "no-referrer"
@@ -111,6 +118,20 @@ def test_every_answer_has_all_security_headers(app, client, stranger):
         assert headers["cross-origin-resource-policy"] == "same-origin"
         assert "cache-control" in headers
         assert "server" not in headers
+
+
+def test_the_policy_of_a_page_with_a_script_allows_this_script_only(client, with_page):
+    made = client.get("/lab/")
+    script = re.search(r"<script data-from=[^>]*>(.*?)</script>", made.text, re.S)[1]
+    assert script == own_files.opening()
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    sources = f"script-src 'self' 'sha256-{digest}'"
+    policy = made.headers["content-security-policy"]
+    assert policy == CONTENT_SECURITY_POLICY.replace("script-src 'self'", sources)
+    assert "</" not in script
+    assert "<!--" not in script
+    own = with_page.get("/own/page")
+    assert own.headers["content-security-policy"] == CONTENT_SECURITY_POLICY
 
 
 def test_the_answer_of_a_failing_page_has_the_content_security_policy(
@@ -403,8 +424,8 @@ def test_a_sign_in_code_works_once_and_for_one_browser(app, make_client):
 
 
 def test_only_the_page_of_the_sign_in_contains_the_key(client, with_page):
-    assert "webmap-key" not in client.get("/lab/").text
-    assert "webmap-key" not in with_page.get("/own/page").text
+    assert 'name="webmap-key"' not in client.get("/lab/").text
+    assert 'name="webmap-key"' not in with_page.get("/own/page").text
     own = with_page.get(f"/own/page?token={TOKEN}", follow_redirects=True)
     assert own.text.index(key_in(own.text)) < own.text.index("</head>")
 

@@ -3,32 +3,42 @@ from urllib.parse import urljoin
 import pytest
 
 from webmap.server.bundles import STARTS
-from webmap.server.html import NEXT, base_from, make_page, prepare_page, relative
+from webmap.server.html import (
+    EARLY,
+    NEXT,
+    base_from,
+    make_page,
+    prepare_page,
+    relative,
+)
 
-PRELOADS = "".join(
-    f'<link rel="{"modulepreload" if name in STARTS[:2] else NEXT}" '
-    f'href="./_webmap/{name}">'
-    for name in STARTS
+OPENING = "opening;"
+NEXT_LINKS = "".join(f'<link rel="{NEXT}" href="./_webmap/{n}">' for n in STARTS[2:])
+FIRST, PAGE = (
+    f'<link rel="modulepreload" href="./_webmap/{name}">' for name in STARTS[:2]
 )
-SHEET = '<link rel="stylesheet" href="./_webmap/web/webmap.css">' + PRELOADS
-SCRIPT = "".join(
-    f'<script type="module" src="./_webmap/web/{name}.js"></script>'
-    for name in ("opening", "page")
-)
+CSS = '<link rel="stylesheet" href="./_webmap/web/webmap.css">'
+SHEET = NEXT_LINKS + FIRST + CSS + PAGE
+EARLY_SCRIPT = f'<script data-from="./_webmap/{STARTS[0]}">{OPENING}</script>'
+SCRIPTS = [
+    f'<script type="module" src="./_webmap/{name}"></script>' for name in STARTS[:2]
+]
+SCRIPT = "".join(SCRIPTS)
 ICON = '<link rel="icon" href="./_webmap/icon.svg" type="image/svg+xml">'
 
 
 def test_a_made_page_has_one_container_and_an_escaped_title():
-    text = make_page("A <b>", base_from("/"))
+    text = make_page("A <b>", base_from("/"), OPENING)
     assert '<div id="webmap_container"></div>' in text
     assert "<title>A &lt;b&gt;</title>" in text
-    early = SCRIPT.replace('<script type="module"', '<script type="module" async', 1)
-    assert text.count(early) == text.count(PRELOADS) == 1
-    assert prepare_page(text, base_from("/")).blocked == []
+    assert f"</title>{NEXT_LINKS}{EARLY_SCRIPT}\n<link" in text
+    assert f"{PAGE}{SCRIPTS[1]}\n</head>" in text
 
 
 def test_a_made_page_is_resized_by_an_on_screen_keyboard():
-    assert "interactive-widget=resizes-content" in make_page("A", base_from("/"))
+    assert "interactive-widget=resizes-content" in make_page(
+        "A", base_from("/"), OPENING
+    )
 
 
 @pytest.mark.parametrize(
@@ -58,7 +68,7 @@ def test_a_relative_url_stays_on_the_server(to):
 
 def test_style_sheets_of_the_user_come_after_webmap_css_and_before_the_script():
     text = '<html><head><link rel="stylesheet" href="a.css"></head><body></body></html>'
-    assert prepare_page(text, base_from("/")).text == (
+    assert prepare_page(text, base_from("/"), OPENING).text == (
         f'<html><head>{SHEET}<link rel="stylesheet" href="a.css">{SCRIPT}{ICON}</head>'
         "<body></body></html>"
     )
@@ -85,7 +95,7 @@ def test_style_sheets_of_the_user_come_after_webmap_css_and_before_the_script():
 def test_html_of_every_form_gets_the_style_sheet_the_script_and_the_icon(
     text, expected
 ):
-    assert prepare_page(text, base_from("/")).text == expected
+    assert prepare_page(text, base_from("/"), OPENING).text == expected
 
 
 def test_files_that_the_html_already_loads_are_not_added_again():
@@ -94,16 +104,18 @@ def test_files_that_the_html_already_loads_are_not_added_again():
         '<link rel="shortcut icon" href="me.png">'
         '<script type="module" src="_webmap/web/page.js"></script></head>'
     )
-    own = prepare_page(text, base_from("/")).text
-    assert own == text.replace("<head>", f"<head>{PRELOADS}")
+    own = prepare_page(text, base_from("/"), OPENING).text
+    assert own == text.replace("<head>", f"<head>{NEXT_LINKS}{FIRST}{PAGE}")
 
 
 def test_a_page_may_open_its_socket_before_its_style_sheets_are_there():
-    early = '<script type="module" async src="_webmap/web/opening.js"></script>'
-    text = f"<head>{early}</head>"
-    _, page = SCRIPT.split("</script>", 1)
-    own = prepare_page(text, base_from("/")).text
-    assert own == f"<head>{SHEET}{early}{page}{ICON}</head>"
+    text = f'<head><link rel="stylesheet" href="a.css">{EARLY}</head>'
+    own = prepare_page(text, base_from("/"), OPENING)
+    assert own.blocked == []
+    assert own.text == (
+        f"<head>{NEXT_LINKS}{EARLY_SCRIPT}{CSS}{PAGE}"
+        f'<link rel="stylesheet" href="a.css">{SCRIPTS[1]}{ICON}</head>'
+    )
 
 
 def test_own_files_of_webmap_that_the_html_loads_get_the_address_of_their_version():
@@ -113,7 +125,7 @@ def test_own_files_of_webmap_that_the_html_loads_get_the_address_of_their_versio
         '<body data-x="_webmap/web/"><img src="_webmap/files/x/y.png">'
         '<script src="/_webmap/features/x.js"></script>'
     )
-    own = prepare_page(text, base_from("/a/") + "v-12/").text
+    own = prepare_page(text, base_from("/a/") + "v-12/", OPENING).text
     assert 'href="../_webmap/v-12/web/style/controls.css">\n' in own
     assert '<link rel="stylesheet" href="web/own.css">' in own
     assert '<body data-x="_webmap/web/">' in own
@@ -129,6 +141,7 @@ def test_content_blocked_by_the_policy_is_named_with_its_line():
         '<img src="//example.com/x.png">\n</head>\n'
         '<body onload="x()">\n<p style="color:red">\n<a href="https://ros.org">',
         base_from("/"),
+        OPENING,
     )
     assert [sentence.partition(" is blocked")[0] for sentence in page.blocked] == [
         "line 2: an inline style",

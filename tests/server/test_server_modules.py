@@ -13,6 +13,7 @@ from webmap.server.bundles import (
     EAGER,
     FIRST_PARTS,
     FIRST_SHEETS,
+    IN_PAGE,
     LATER,
     LATER_PARTS,
     PART_FOLDERS,
@@ -79,6 +80,7 @@ def test_each_module_has_the_same_exports_as_its_source(read):
 def test_each_module_of_webmap_is_served_once_and_a_page_starts_with_few():
     sources = own_files(".js")
     served = served_modules(sources)
+    in_page = served.pop(IN_PAGE)
     texts = {name: text for name, text in served.items() if name.endswith(".js")}
     for name in sources:
         where = [key for key, text in texts.items() if f'["{name}"] ??= (' in text]
@@ -87,11 +89,13 @@ def test_each_module_of_webmap_is_served_once_and_a_page_starts_with_few():
     while todo:
         name = todo.pop()
         loaded.add(name)
-        for address in re.findall(r'^import .* from "(.+)";$', texts[name], re.M):
+        for address in re.findall(r' await import\("(.+)"\);$', texts[name], re.M):
             needed = (PACKAGE / name).parent.joinpath(address).resolve()
             todo.append(needed.relative_to(PACKAGE).as_posix())
     assert loaded == set(STARTS)
     assert len(STARTS) == 3
+    first = re.findall(r'^\$modules\["(.+)"\] \?\?= ', in_page, re.M)
+    assert first == re.findall(r'^\$modules\["(.+)"\] \?\?= ', texts[STARTS[0]], re.M)
 
 
 def test_chromium_compiles_whole_bundles_beside_the_main_thread():
@@ -158,7 +162,8 @@ FEW = {
 def test_modules_that_a_page_does_not_start_with_are_served_as_one():
     served = served_modules(FEW, ["start.js"])
     assert served[PARTS] == EAGER + (
-        'import { $modules } from "./start.js";\n'
+        "const $modules = (globalThis.$modules ??= {});\n"
+        'if (!$modules["start.js"]) await import("./start.js");\n'
         '$modules["x/own.js"] ??= (() => {\n'
         'const {\na,\nb: c,\n} = $modules["both.js"];\n'
         "\nclass own {}\n"
@@ -184,7 +189,8 @@ def test_modules_that_a_page_does_not_start_with_are_served_as_one():
 def test_what_is_imported_when_it_is_used_is_served_with_what_only_this_imports():
     served = served_modules(FEW, ["start.js"])
     assert served[LATER] == EAGER + (
-        'import { $modules } from "./parts.js";\n'
+        "const $modules = (globalThis.$modules ??= {});\n"
+        'if (!$modules["parts.js"]) await import("./parts.js");\n'
         '$modules["x/only.js"] ??= (() => {\n'
         "const own = 3;\n"
         "\nreturn { own };\n})();\n"
@@ -229,6 +235,7 @@ def test_the_address_of_a_module_within_another_has_the_same_exports():
         PARTS + ".map",
         LATER,
         LATER + ".map",
+        IN_PAGE,
         "start.js.map",
     }
 

@@ -27,6 +27,7 @@ globalThis.addEventListener = (_, fn) => online.push(fn);
 globalThis.WebSocket = Hanging;
 const { AnswerPace } = await import("../../src/webmap/web/frames.js");
 const { Link } = await import("../../src/webmap/web/link.js");
+const { unpacked } = await import("../../src/webmap/web/packed.js");
 
 function makeLink(t, first) {
   Hanging.made = [];
@@ -72,8 +73,8 @@ test("a new connection replaces a pending one when the network is back", (t) => 
 /** @returns A socket that was opened before the link was made, with two messages. */
 function firstSocket(readyState) {
   const received = [
-    { data: new ArrayBuffer(3), at: 20 },
-    { data: new ArrayBuffer(4), at: 70 },
+    { data: Promise.resolve(new ArrayBuffer(3)), at: 20 },
+    { data: Promise.resolve(new ArrayBuffer(4)), at: 70 },
   ];
   return { socket: Object.assign(new Hanging(), { readyState }), received };
 }
@@ -82,13 +83,16 @@ test("a link takes over an open socket, and what came before with its times", as
   const { link, reported } = makeLink(t, firstSocket(Hanging.OPEN));
   assert.ok(link.isOpen);
   assert.deepEqual(reported, [], "events come after the constructor");
-  await Promise.resolve();
+  await until(reported, 3);
   assert.deepEqual(reported, ["opened", [3, 20], [4, 70]]);
 });
 
 /** @returns A link whose first socket received these messages, and its reports. */
 async function linkWith(t, messages) {
-  const received = messages.map((data, at) => ({ data: Uint8Array.from(data).buffer, at }));
+  const received = messages.map((data, at) => ({
+    data: unpacked(Uint8Array.from(data).buffer),
+    at,
+  }));
   const socket = Object.assign(new Hanging(), { readyState: Hanging.OPEN });
   const made = makeLink(t, { socket, received });
   await Promise.resolve();

@@ -55,6 +55,7 @@ from webmap.server.security import (
     VIEWER,
     Security,
     plain,
+    policy_with,
 )
 from webmap.server.sockets import (
     ConnectToGate,
@@ -336,23 +337,29 @@ class PageAnswers:
     def _page(self, request: Request, entry: PageEntry) -> Response:
         files = f"{base_from(entry.path)}v-{own_files.version()}/"
         key, marks = request.scope.get(PAGE_KEY), request.scope.get(MARKS, ())
+        opening = own_files.opening()
         if entry.html is None:
-            return self._html(request, make_page(entry.title, files, key, marks), key)
+            made = make_page(entry.title, files, opening, key, marks)
+            return self._html(request, made, opening, key)
         try:
             text = entry.html.read_text("utf-8-sig")
         except (OSError, UnicodeDecodeError) as error:
             log.error("page %s: cannot read %s: %s", entry.path, entry.html, error)
             return plain(500, "The HTML file of this page cannot be read as UTF-8.")
-        page = prepare_page(text, files, key, marks)
+        page = prepare_page(text, files, opening, key, marks)
         self._warn(entry.html, page.blocked)
-        return self._html(request, page.text, key)
+        return self._html(request, page.text, opening, key)
 
-    def _html(self, request: Request, text: str, key: str | None) -> Response:
+    def _html(
+        self, request: Request, text: str, opening: str, key: str | None
+    ) -> Response:
         data = text.encode()
         headers = {
             "cache-control": "no-store" if key else "no-cache",
             "vary": "accept-encoding",
         }
+        if opening in text:
+            headers["content-security-policy"] = policy_with(opening)
         if accepts_gzip(request.headers.get("accept-encoding", "")):
             headers["content-encoding"] = "gzip"
             # A page with a key is sent once, and the key is not stored.

@@ -3,11 +3,14 @@
 A page of many small modules waits for one round trip after another, and each request
 costs the browser some milliseconds. So a page loads the bundles of :data:`STARTS` and
 :data:`PARTS`: each has some modules in the order of their imports, every module in a
-function of its own. One object ``$modules`` has the exports of all by name. So every
-module is one instance, also if a page loads a bundle again after a failure: at the
-address of a module within a bundle is a module that exports the same objects, for
+function of its own. The page's object ``$modules`` has the exports of all by name. So
+every module is one instance, also if a page loads a bundle again after a failure: at
+the address of a module within a bundle is a module that exports the same objects, for
 modules of users. The style sheets of features are served as one too. What is imported
 by ``import()`` is in a bundle of its own, :data:`LATER`.
+
+The console and generated pages have the first bundle in their HTML, as the script
+:data:`IN_PAGE`, and do not load it.
 
 Indentation and comments on lines of their own are left out, and lines of comments stay
 empty, so that lines have the same numbers everywhere. A source map has the sources as
@@ -29,6 +32,10 @@ the gate with STOP and driving.
 
 Each is a module with all that it imports, if no bundle before has it.
 """
+
+IN_PAGE = "opening_in_page.js"
+"""The first bundle as a script that is not a module; its element has the address of the
+bundle in ``data-from``."""
 
 FIRST_PARTS = {
     "features/stop/stop_button.js": "web/drive.js",
@@ -126,6 +133,7 @@ def served_modules(
         }
         texts[bundle], texts[bundle + ".map"] = _bundle(bundle, within, before)
         before = bundle
+    texts[IN_PAGE] = _in_page(texts[starts[0]])
     for name, bundle in bundles.items():
         if name != bundle:
             texts[name] = _import(bundle, name) + _exported(name, sources[name])
@@ -162,10 +170,13 @@ def _bundle(bundle: str, sources: Mapping[str, str], before: str) -> tuple[str, 
     Args:
         bundle: Its name.
         sources: The modules, in the order in which they run.
-        before: The bundle before, which has the object of the exports; "" for none.
+        before: The bundle before, which must run first; "" for none.
 
     """
-    text = EAGER + (_import(before, bundle) if before else "const $modules = {};\n")
+    text = EAGER + "const $modules = (globalThis.$modules ??= {});\n"
+    if before:  # the page may have it as a script
+        address = _address(before, bundle)
+        text += f'if (!$modules["{before}"]) await import("{address}");\n'
     sections = []
     for name, source in sources.items():
         text += f'$modules["{name}"] ??= (() => {{\n'
@@ -185,6 +196,14 @@ def _bundle(bundle: str, sources: Mapping[str, str], before: str) -> tuple[str, 
         text += _exported(bundle, sources[bundle])
     text += f"//# sourceMappingURL={posixpath.basename(bundle)}.map\n"
     return text, json.dumps({"version": 3, "sections": sections})
+
+
+def _in_page(text: str) -> str:
+    """Return a bundle as a script that is not a module."""
+    lines = text.split("\n")
+    kept = [line for line in lines if line and not line.startswith(("//", "export "))]
+    here = "new URL(document.currentScript.dataset.from, location.href)"
+    return "{\n" + "\n".join(kept).replace("import.meta.url", here) + "\n}\n"
 
 
 def _imports(name: str, source: str) -> list[str]:

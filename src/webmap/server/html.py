@@ -3,8 +3,14 @@
 The user's file is changed in three ways only: the base style sheet is inserted first in
 the head, so that the user's own rules override it, and the script last; and WebMap's
 own files that the page loads by itself get the address of their version.
+
+A page can open its socket before its style sheets are there, if the size of the window
+is near that of its map: then its HTML has the element :data:`EARLY`. The text of
+``web/opening.js`` takes its place, first in the head. It runs as soon as the HTML
+comes; a module would come a round trip later.
 """
 
+import functools
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -16,7 +22,10 @@ from webmap.server.bundles import STARTS
 from webmap.server.own_files import FOLDERS
 
 NEXT = "webmap-next"
-"""The relation of links to the bundles that opening.js loads."""
+"""The relation of links to the bundles that opening.js makes the browser load."""
+
+EARLY = '<script type="module" async src="_webmap/web/opening.js"></script>'
+"""In the HTML of a page that opens its socket early."""
 
 FOLDER = "/_webmap/"
 """The path of WebMap's own files and sockets, under the application's root."""
@@ -27,12 +36,11 @@ _MADE = """<!doctype html>
 <meta charset="utf-8">
 <meta name="viewport"
   content="width=device-width, initial-scale=1, interactive-widget=resizes-content">
-<title>{title}</title>{key}
+<title>{title}</title>{first}
 <link rel="icon" href="{base}icon.svg" type="image/svg+xml">
 <link rel="stylesheet" href="{base}web/webmap.css">
 <link rel="stylesheet" href="{base}made_page.css">
-{preloads}
-{scripts}
+{last}
 </head>
 <body>
 <div id="webmap_container"></div>
@@ -65,13 +73,18 @@ def relative(path: str, to: str) -> str:
 
 
 def make_page(
-    title: str, base: str, key: str | None = None, marks: Iterable[str] = ()
+    title: str,
+    base: str,
+    opening: str,
+    key: str | None = None,
+    marks: Iterable[str] = (),
 ) -> str:
     """Return a page with one container that fills the window.
 
     Args:
         title: The page's title.
         base: The URL of WebMap's own files: that of :func:`base_from`, and a version.
+        opening: The script with which the page opens its socket.
         key: The page's key, if it has just signed in.
         marks: The names of empty elements for the page's script.
 
@@ -79,37 +92,31 @@ def make_page(
     return _MADE.format(
         title=escape(title),
         base=escape(base),
-        key=_for_script(key, marks),
-        preloads=_preloads(base),
-        scripts=_script(base, STARTS[0], early=True) + _script(base, STARTS[1]),
+        first=_for_script(key, marks) + _opening(base, opening),
+        last=_link("modulepreload", base, STARTS[1]) + _script(base, STARTS[1]),
     )
 
 
-def _preloads(base: str) -> str:
-    """Return the elements with which a browser loads bundles at once, not in turn.
-
-    First those of the picture, with the style sheets. When opening.js runs, it makes
-    the browser load the others.
-    """
-    return "".join(
-        f'<link rel="{rel}" href="{escape(base)}{name}">'
-        for rel, names in (("modulepreload", STARTS[:2]), (NEXT, STARTS[2:]))
-        for name in names
-    )
-
-
-def _script(base: str, name: str, *, early: bool = False) -> str:
-    """Return the element that runs a module.
+def _opening(base: str, script: str) -> str:
+    """Return the elements for the first bundle, and for those that it loads.
 
     Args:
         base: The URL of WebMap's own files.
-        name: The module.
-        early: Whether it runs before the style sheets are there: ``web/opening.js``
-            does so on pages for which the window's size is near that of the map.
+        script: The text of the first bundle; "" if the page loads it.
 
     """
-    when = "async " if early else ""
-    return f'<script type="module" {when}src="{escape(base)}{name}"></script>'
+    links = "".join(_link(NEXT, base, name) for name in STARTS[2:])
+    if not script:
+        return links + _link("modulepreload", base, STARTS[0])
+    return f'{links}<script data-from="{escape(base)}{STARTS[0]}">{script}</script>'
+
+
+def _link(rel: str, base: str, name: str) -> str:
+    return f'<link rel="{rel}" href="{escape(base)}{name}">'
+
+
+def _script(base: str, name: str) -> str:
+    return f'<script type="module" src="{escape(base)}{name}"></script>'
 
 
 def _for_script(key: str | None, marks: Iterable[str]) -> str:
@@ -127,25 +134,33 @@ class OwnPage:
 
 
 def prepare_page(
-    text: str, base: str, key: str | None = None, marks: Iterable[str] = ()
+    text: str,
+    base: str,
+    opening: str,
+    key: str | None = None,
+    marks: Iterable[str] = (),
 ) -> OwnPage:
     """Insert the base style sheet and the page's script into a user's HTML.
 
     Args:
         text: The user's whole HTML.
         base: The URL of WebMap's own files: that of :func:`base_from`, and a version.
+        opening: The script with which a page with :data:`EARLY` opens its socket.
         key: The page's key, if it has just signed in.
         marks: The names of empty elements for the page's script.
 
     """
     version = base.rpartition(FOLDER)[2]
-    seen = _Reader(text)
+    own = text.replace(EARLY, "", 1)
+    is_early = own != text
+    text, seen = own, _read(own)
     first, last = _for_script(key, marks), ""
+    first += _opening(base, opening if is_early else "")
     if not seen.has("web/webmap.css"):
-        first += f'<link rel="stylesheet" href="{escape(base)}web/webmap.css">'
-    first += _preloads(base)
+        first += _link("stylesheet", base, "web/webmap.css")
+    first += _link("modulepreload", base, STARTS[1])
     if not seen.has("web/page.js"):
-        last = "".join(_script(base, name) for name in STARTS[:2] if not seen.has(name))
+        last = "".join(_script(base, name) for name in STARTS[is_early:2])
     if not seen.icon:
         last += f'<link rel="icon" href="{escape(base)}icon.svg" type="image/svg+xml">'
     start, end = seen.head()
@@ -153,6 +168,11 @@ def prepare_page(
     for at, what in sorted(added, key=lambda one: one[0], reverse=True):
         text = text[:at] + what + text[at:]
     return OwnPage(text, seen.blocked)
+
+
+@functools.lru_cache(maxsize=8)
+def _read(text: str) -> "_Reader":
+    return _Reader(text)  # it takes milliseconds, for which the browser waits
 
 
 class _Reader(HTMLParser):

@@ -13,7 +13,7 @@ import re
 import threading
 from pathlib import Path
 
-from webmap.server.bundles import served_modules, served_sheets
+from webmap.server.bundles import IN_PAGE, served_modules, served_sheets
 from webmap.server.files import MEDIA_TYPES, File, NoSuchFile
 
 PACKAGE = Path(__file__).parents[1]
@@ -45,6 +45,10 @@ class OwnFiles:
                 self._files = _serve(self._paths)
                 self._version = _hash(self._files)
             return self._version
+
+    def opening(self) -> str:
+        """Return the script with which a page opens its first socket."""
+        return self.file(f"v-{self.version()}/{IN_PAGE}").data.decode()
 
     def file(self, name: str) -> File:
         """Return a file by its address below ``/_webmap/``.

@@ -41,6 +41,18 @@ CONTENT_SECURITY_POLICY = (
     "form-action 'self'; require-trusted-types-for 'script'"
 )
 
+
+def policy_with(script: str) -> str:
+    """Return the policy of a page that has this script in its HTML."""
+    return CONTENT_SECURITY_POLICY.replace("'self'", f"'self' {_source(script)}", 1)
+
+
+def _source(text: str) -> str:
+    """Return the source of a policy that allows one text in the HTML."""
+    digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+    return f"'sha256-{digest}'"
+
+
 HEADERS = (
     (b"content-security-policy", CONTENT_SECURITY_POLICY.encode()),
     (b"x-content-type-options", b"nosniff"),
@@ -390,10 +402,8 @@ _ASK_NAME = """<form method="post" action="{action}">
 <button>Sign in</button>
 </form>"""
 
-_HASH = base64.b64encode(hashlib.sha256(_STYLE.encode()).digest()).decode()
-
 _POLICY = (
-    f"default-src 'none'; style-src 'sha256-{_HASH}'; frame-ancestors 'none'; "
+    f"default-src 'none'; style-src {_source(_STYLE)}; frame-ancestors 'none'; "
     "base-uri 'none'; form-action 'self'"
 )
 """This page has its style in it, and needs nothing else."""

@@ -2,6 +2,7 @@
 
 import { FOR_GOOD } from "./constants.js";
 import { onSignIn, protocols } from "./access.js";
+import { isPacked, unpacked } from "./packed.js";
 
 /** Milliseconds before a lost connection is opened again: first and longest wait. */
 const FIRST_WAIT = 250;
@@ -22,33 +23,9 @@ const LONGEST_PATIENCE = 20_000;
 /**
  * @typedef {object} FirstSocket
  * @property {WebSocket} socket
- * @property {Array<{data: unknown, at: number}>} received What has come over it, with
- *     the times of `performance.now()`.
+ * @property {Array<{data: Promise<ArrayBuffer>, at: number}>} received The messages that
+ *     have come, decompressed, with the times of `performance.now()`.
  */
-
-/**
- * @param {ArrayBuffer} data
- * @returns {boolean} Whether it is compressed with gzip; no frame starts so.
- */
-function isPacked(data) {
-  const [first, second] = new Uint8Array(data, 0, Math.min(2, data.byteLength));
-  return first === 0x1f && second === 0x8b;
-}
-
-/**
- * @param {ArrayBuffer} data
- * @returns {Promise<ArrayBuffer>} Decompressed; unchanged if that fails, so that the
- *     page reports a message that it cannot read.
- */
-async function unpacked(data) {
-  if (!isPacked(data)) return data;
-  try {
-    const stream = new Blob([data]).stream().pipeThrough(new DecompressionStream("gzip"));
-    return await new Response(stream).arrayBuffer();
-  } catch {
-    return data;
-  }
-}
 
 /** A WebSocket that reconnects; a message without a connection is dropped. */
 export class Link {
@@ -133,7 +110,7 @@ export class Link {
     // Events come after the constructor, as those of a new socket.
     queueMicrotask(() => {
       hear.open();
-      for (const { data, at } of received) hear.message(data, at);
+      for (const { data, at } of received) hear.inTurn(data, at);
     });
   }
 
@@ -149,30 +126,37 @@ export class Link {
     /** @type {Promise<void> | null} Of the last message, if it waits. */
     let last = null;
     /**
-     * @param {unknown} data
+     * @param {ArrayBuffer} frame
      * @param {number} at
      */
-    const message = (data, at) => {
-      if (!(data instanceof ArrayBuffer)) return;
-      const deliver = (/** @type {ArrayBuffer} */ frame) => {
-        if (this._socket === socket) this._events.received(frame, at);
-      };
-      if (!last && !isPacked(data)) return deliver(data);
-      // Messages that come meanwhile wait, so that all stay in order.
-      const mine = Promise.all([unpacked(data), last]).then(([frame]) => {
+    const deliver = (frame, at) => {
+      if (this._socket === socket) this._events.received(frame, at);
+    };
+    /**
+     * Messages that come meanwhile wait, so that all stay in order.
+     *
+     * @param {Promise<ArrayBuffer>} data
+     * @param {number} at
+     */
+    const inTurn = (data, at) => {
+      const mine = Promise.all([data, last]).then(([frame]) => {
         if (last === mine) last = null;
-        deliver(frame);
+        deliver(frame, at);
       });
       last = mine;
     };
     socket.addEventListener("open", open);
-    socket.addEventListener("message", ({ data }) => message(data, performance.now()));
+    socket.addEventListener("message", ({ data }) => {
+      if (!(data instanceof ArrayBuffer)) return;
+      if (last || isPacked(data)) inTurn(unpacked(data), performance.now());
+      else deliver(data, performance.now());
+    });
     socket.addEventListener("close", ({ code, reason }) => {
       const current = this._socket === socket;
       this._lost(socket, reason, code);
       if (current && !opened) this._events.refused();
     });
-    return { open, message };
+    return { open, inTurn };
   }
 
   /**

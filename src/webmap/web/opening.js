@@ -2,14 +2,16 @@
  * The page's identity, and its first socket.
  *
  * This module is small and comes before `page.js`: the display makes the first picture
- * while the browser still loads and compiles the others.
+ * while the browser still loads and compiles the others. The console and generated pages
+ * have it in their HTML, where it runs before the style sheets are there.
  */
 
 import { pagePath, protocols, socketAddress, takeIdentity, takeKey } from "./access.js";
 import { LONGEST_TEXTS } from "./constants.js";
+import { unpacked } from "./packed.js";
 import { containers } from "./sizes.js";
 
-/** The relation of links to modules that a page loads when its first socket opens. */
+/** The relation of links to the bundles that a page loads next. */
 const NEXT = "webmap-next";
 
 takeKey();
@@ -24,7 +26,7 @@ export const id = takeIdentity(path);
  * Whether the socket opens before the style sheets are there: the page knows no sizes
  * yet, and the display takes the window's until the page reports its view.
  */
-let early = document.querySelector('script[async][src$="/web/opening.js"]') !== null;
+let early = document.body === null;
 
 /** Whether the viewer prefers dark colors. */
 export const dark = matchMedia("(prefers-color-scheme: dark)");
@@ -49,17 +51,21 @@ export function sceneAddress() {
 const socket = new WebSocket(sceneAddress(), protocols());
 early = false;
 socket.binaryType = "arraybuffer";
-/** @type {Array<{data: unknown, at: number}>} */
+/** @type {import('./link.js').FirstSocket["received"]} */
 const received = [];
 
-// On a slow link, these modules would delay this one, and the style sheets.
-for (const link of document.querySelectorAll(`link[rel="${NEXT}"]`)) {
-  link.setAttribute("rel", "modulepreload");
+/** Load what comes after the data of the first picture: on a slow link it delays them. */
+function loadNext() {
+  for (const link of document.querySelectorAll(`link[rel="${NEXT}"]`)) {
+    link.setAttribute("rel", "modulepreload");
+  }
 }
 
 /** @param {MessageEvent} message */
 function store({ data }) {
-  received.push({ data, at: performance.now() });
+  if (!(data instanceof ArrayBuffer)) return;
+  received.push({ data: unpacked(data), at: performance.now() });
+  loadNext();
 }
 socket.addEventListener("message", store);
 
@@ -70,5 +76,6 @@ socket.addEventListener("message", store);
  */
 export function takeFirstSocket() {
   socket.removeEventListener("message", store);
+  loadNext();
   return { socket, received };
 }

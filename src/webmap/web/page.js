@@ -23,6 +23,8 @@ const SILENT = 3000;
 const DEAD = 10_000;
 /** Milliseconds between two checks; the server sends at least every second. */
 const LOOK_PERIOD = 500;
+/** Milliseconds for which pictures may wait until driving is loaded. */
+const STOP_FIRST = 2000;
 
 /** One open page: its connection to the display, its scene, its notices. */
 export class Page {
@@ -52,7 +54,7 @@ export class Page {
     });
     this._frames = new Frames(
       (data, received) => this.scene.apply(data, received),
-      (message) => this.send(message),
+      (message) => void this._answer(message),
       (error, forGood) => this._misunderstood(error, forGood),
     );
     this._reports = new Reports(
@@ -63,6 +65,8 @@ export class Page {
     this._drive = null;
     /** @type {typeof import('./drive.js') | null} */
     this._driving = null;
+    /** @type {Promise<unknown> | null} Resolves when driving is loaded, or cannot be. */
+    this._loading = null;
     this._restyling = 0;
     /** Whether nothing came yet over this connection. */
     this._isNew = false;
@@ -116,7 +120,20 @@ export class Page {
   /** @returns {Promise<typeof import('./drive.js')>} */
   async _loadDrive() {
     const { href } = new URL("drive.js", import.meta.url);
-    return (this._driving ??= await importOf(href));
+    const load = importOf(href);
+    const limit = new Promise((done) => setTimeout(done, STOP_FIRST));
+    this._loading ??= Promise.race([load.catch(() => {}), limit]);
+    return (this._driving ??= await load);
+  }
+
+  /**
+   * Answer frames. On a slow link, more of them would delay driving and STOP.
+   *
+   * @param {object} message
+   */
+  async _answer(message) {
+    await this._loading;
+    this.send(message);
   }
 
   /**
