@@ -3,15 +3,11 @@
 import re
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING
 
-from webmap import html, refusals
+from webmap import Bridge, Element, html, refusals
 from webmap.base.text import counted
 from webmap.console.robot_looks import icon
 from webmap.poses.frames import frame_faults
-
-if TYPE_CHECKING:
-    from webmap import Bridge, Element
 
 WORST = ("lost", "connecting", "late", "faulty")
 """States that are not well, the worst first; ``faulty`` is about the frames."""
@@ -36,11 +32,11 @@ class BridgeList:
 
     def __init__(
         self,
-        element: "Element",
-        bridges: Sequence["Bridge"],
-        button_of: Callable[["Bridge"], "Element"],
+        element: Element,
+        bridges: Sequence[Bridge],
+        button_of: Callable[[Bridge], Element],
         routers: Mapping[str, Callable[[], tuple[str, str]]],
-        waiting: "Element",
+        waiting: Element,
     ) -> None:
         self._bridges = bridges
         self._button_of = button_of
@@ -88,12 +84,12 @@ class BridgeList:
         for part in re.split(r"(?<=, )", text):
             self._text.append(html.span(text=part))
 
-    def _show(self, key: "Bridge | str", state: tuple[str, str]) -> None:
+    def _show(self, key: Bridge | str, state: tuple[str, str]) -> None:
         line, word = self._lines.get(key) or self._add(key)
         line.set("data-link", state[0])
         word.text = state[1]
 
-    def _add(self, key: "Bridge | str") -> "tuple[Element, Element]":
+    def _add(self, key: Bridge | str) -> tuple[Element, Element]:
         """Add the line of a bridge, or of the router at an address."""
         name, url = (key, key) if isinstance(key, str) else (key.name, key.url)
         word = html.span(class_="word")
@@ -107,7 +103,7 @@ class BridgeList:
         return line, word
 
 
-def describe_link(bridge: "Bridge") -> tuple[str, str]:
+def describe_link(bridge: Bridge) -> tuple[str, str]:
     """Return the page's name for a bridge's state, and a sentence that describes it."""
     if bridge.state == "open":
         late, faults = bridge.lag >= LATE, frame_faults(bridge)
@@ -167,7 +163,7 @@ class RefusedList:
         role: The role of the page's user.
     """
 
-    def __init__(self, element: "Element", role: str) -> None:
+    def __init__(self, element: Element, role: str) -> None:
         self._may = role != "viewer"
         self._text = html.span()
         self._newest = html.span(class_="newest")
@@ -196,7 +192,7 @@ class RefusedList:
             self._list.append(line(row.by, row.count, row.last, row.at))
 
 
-def line(by: str, count: int, last: str, at: datetime) -> "Element":
+def line(by: str, count: int, last: str, at: datetime) -> Element:
     """Return the number of one person's refused messages, and the last of them."""
     messages = counted(count, "message")
     return html.li(

@@ -3,10 +3,9 @@
 import logging
 from collections.abc import Mapping
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
-if TYPE_CHECKING:
-    from webmap import Map
+from webmap import Map
 
 log = logging.getLogger("webmap.console")
 
@@ -23,7 +22,7 @@ class OperatorName:
 
     MAY_SEND: ClassVar[Mapping[str, str]] = {"name": "viewer", "place": "viewer"}
 
-    def __init__(self, map: "Map") -> None:
+    def __init__(self, map: Map) -> None:
         self.map = map
         self._shown: object = None
         self.browser_part = map.add_browser_part(self, "console/operator_name.js", {})

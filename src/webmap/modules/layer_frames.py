@@ -1,10 +1,9 @@
 """The alignment of a layer, and the frames of its data."""
 
-from typing import TYPE_CHECKING
-
 from webmap.base.geometry import Affine, Pose
 from webmap.base.scope import keep
 from webmap.core.layer import Layer
+from webmap.core.robot import Robot
 from webmap.modules.placed import put
 from webmap.modules.sighting import newest_or_at
 from webmap.poses.alignment import alignments
@@ -12,9 +11,6 @@ from webmap.poses.frames import Frames, delayed_problem, frames_of
 from webmap.poses.placing import ProblemDelay
 from webmap.ros.bridge import Bridge
 from webmap.ros.tf import Transform, TransformError
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
 
 
 class LayerFrames:
@@ -40,7 +36,7 @@ class LayerFrames:
         bridge: Bridge,
         map_frame: str | None,
         namespace: str,
-        robot: "Robot | None" = None,
+        robot: Robot | None = None,
     ) -> None:
         self._layer = layer
         self._bridge = bridge

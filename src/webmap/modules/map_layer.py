@@ -1,16 +1,14 @@
 """Base class of layers that draw the messages of one topic on maps."""
 
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from webmap.core.layer import Layer
+from webmap.core.map import Map
 from webmap.core.registry import map_modules
+from webmap.core.robot import Robot
 from webmap.modules.layer_frames import Anchored
 from webmap.modules.layer_options import Seconds
 from webmap.modules.topic_layer import LEVEL, TopicLayer, origin, short
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
-    from webmap.core.robot import Robot
 
 NEVER = 1e9
 """Age limit in seconds of a layer without one, so that it is never stale."""
@@ -45,7 +43,7 @@ class MapLayer(TopicLayer, Layer):
     namespace: str = ""
     """``/robot_0`` if the frames are on ``/robot_0/tf``."""
 
-    robot: "Robot | None" = None
+    robot: Robot | None = None
     """The robot of the layer: it has the alignment of that robot, or of the bridge
     without a robot."""
 
@@ -56,7 +54,7 @@ class MapLayer(TopicLayer, Layer):
     usual_order = 50.0
     """The order if none is given."""
 
-    def __new__(cls, map: "Map", *args: Any, **options: Any) -> Any:
+    def __new__(cls, map: Map, *args: Any, **options: Any) -> Any:
         """Return the module that shows the layer on a map."""
         return ShownLayer(map, cls, args, options)
 
@@ -114,7 +112,7 @@ class ShownLayer:
 
     def __init__(
         self,
-        map: "Map",
+        map: Map,
         layer: type[MapLayer],
         args: tuple[Any, ...],
         options: dict[str, Any],

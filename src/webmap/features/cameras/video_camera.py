@@ -5,20 +5,18 @@ a browser can decode the video.
 """
 
 import time
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 from webmap.base.errors import ConfigError, ProtocolError
 from webmap.core.pictures import VideoStream, videos
 from webmap.core.problems import draw_or_report
 from webmap.core.registry import robot_modules
+from webmap.core.robot import Robot
 from webmap.features.cameras.camera import TopicCamera
 from webmap.features.cameras.video_codecs import H264, Picture, Vp9
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages_image import MAX_PIXELS, CompressedVideoMsg, FfmpegPacketMsg
 from webmap.ros.names import VIDEO, split_type
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
 
 MOST_BYTES = 2 << 20
 """Most bytes of a packet."""
@@ -176,7 +174,7 @@ class VideoCamera(TopicCamera):
 
     def __init__(
         self,
-        robot: "Robot",
+        robot: Robot,
         bridge: Bridge,
         topic: str,
         name: str = "Camera",

@@ -5,7 +5,7 @@ import time
 import weakref
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
+from typing import Any, ClassVar, Literal, TypeAlias
 
 import msgspec
 
@@ -13,14 +13,12 @@ from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.scope import Removal, keep
 from webmap.core.problems import draw_or_report
 from webmap.core.registry import robot_modules
+from webmap.core.robot import Robot
 from webmap.modules.declaration import FoundTopic, TopicKind, layer
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import Stamped
 from webmap.scene import html, svg
 from webmap.scene.element import Element
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
 
 Owner: TypeAlias = Literal["own", "another", "unknown"]
 """Owner of a part, for one robot: the robot, another robot, or unknown."""
@@ -223,7 +221,7 @@ class Diagnostics:
 
     def __init__(
         self,
-        robot: "Robot",
+        robot: Robot,
         bridge: Bridge,
         topic: str = "/diagnostics",
         *,

@@ -3,8 +3,9 @@
 import time
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
+from webmap.core.base_page import BasePage
 from webmap.core.shift_choice import SINCE, Choice, may_see
 from webmap.core.shift_files import Entry
 from webmap.core.shift_log import shift_log
@@ -17,9 +18,6 @@ from webmap.features.shift_log.shift_summary import (
 )
 from webmap.scene import html
 from webmap.scene.element import Event
-
-if TYPE_CHECKING:
-    from webmap.core.base_page import BasePage
 
 HTML = Path(__file__).with_name("hand_over.html")
 
@@ -50,7 +48,7 @@ class HandOver:
 
     def __init__(
         self,
-        page: "BasePage",
+        page: BasePage,
         robots: Callable[[], Sequence[RobotNow]],
         alerts: Callable[[], Iterable[Any]],
     ) -> None:
