@@ -59,7 +59,7 @@ class PartOwners:
         if len(self._followers) < 2:
             return "own"
         # The text after the colon is a task, which may contain slashes too.
-        inside = without_slashes(name).partition(":")[0]
+        inside = name.strip("/").partition(":")[0]
         while inside and inside not in self._followers:
             inside = inside.rpartition("/")[0]
         if not inside:
@@ -70,11 +70,6 @@ class PartOwners:
         self._followers[namespace] -= 1
         if not self._followers[namespace]:
             del self._followers[namespace]
-
-
-def without_slashes(name: str) -> str:
-    """Return the name of a part, or a namespace, without outer slashes."""
-    return name.strip("/")
 
 
 def part_owners(bridge: Bridge, topic: str) -> PartOwners:
@@ -238,7 +233,7 @@ class Diagnostics:
                 f"{namespace!r} and {prefix!r}"
             )
         self.robot = robot
-        self.namespace = without_slashes(namespace)
+        self.namespace = namespace.strip("/")
         self.prefix = prefix.lstrip("/")
         self.hold = hold
         self._owners = part_owners(bridge, topic)

@@ -98,7 +98,7 @@ class StopLatch:
         if waiting:  # one write at a time; the next one has the newest press
             self._save_next = True
         else:
-            self._save()
+            self.save()
 
     def found(self, press: Press) -> None:
         """Take over a press that an earlier or another gate saved on disk."""
@@ -117,10 +117,6 @@ class StopLatch:
     def settled(self) -> bool:
         """Whether no save is pending."""
         return self._saved
-
-    def save_again(self) -> None:
-        """Save the current state again, because the file was removed."""
-        self._save()
 
     def drop(self) -> None:
         """Deactivate STOP here only; another gate is responsible for the file."""
@@ -145,7 +141,7 @@ class StopLatch:
     def reset(self) -> None:
         """End the STOP, also on disk."""
         self.press = self.shown = None
-        self._save()
+        self.save()
         self._ids.clear()
 
     def kept(self, event: StopSaved) -> None:
@@ -155,11 +151,12 @@ class StopLatch:
         self._saved, self.trouble = True, event.error
         self.shown = self._saving
         if self._save_next:
-            self._save()
+            self.save()
         elif self.shown is not None and event.error is None:
             self._ids = {self.shown.id}
 
-    def _save(self) -> None:
+    def save(self) -> None:
+        """Save the current state."""
         self._number += 1
         self._saved, self.trouble, self._save_next = False, None, False
         self._saving = self.press
@@ -338,7 +335,7 @@ class ActiveStop:
             for hooks in self._robots.hooks.values():
                 hooks.drop()
         else:
-            latch.save_again()  # a removed file is no reset
+            latch.save()  # a removed file is no reset
         return False
 
     def take_over(self, press: Press, now: float) -> None:
