@@ -4,8 +4,7 @@ from typing import Any, ClassVar, Self
 
 from webmap.base.geometry import Affine, Pose
 from webmap.base.scope import keep
-from webmap.core.layer import Layer
-from webmap.core.map import Map
+from webmap.core.map import Layer, Map
 from webmap.core.registry import map_modules
 from webmap.core.robot import Robot
 from webmap.modules.layer_options import Seconds

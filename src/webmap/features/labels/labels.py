@@ -10,8 +10,7 @@ from webmap.base.errors import ConfigError
 from webmap.base.roles import Role
 from webmap.base.scope import Removal, keep
 from webmap.base.tasks import spawn
-from webmap.core.layer import Layer
-from webmap.core.map import Map, robot_and_pose
+from webmap.core.map import Layer, Map, robot_and_pose
 from webmap.core.registry import map_modules
 from webmap.features.labels.label_store import (
     ICONS,

@@ -6,8 +6,7 @@ from pathlib import Path
 from webmap.base.errors import ConfigError
 from webmap.base.map_file import MapImage, cell_at, read_map
 from webmap.base.tasks import spawn
-from webmap.core.layer import Layer
-from webmap.core.map import Map
+from webmap.core.map import Layer, Map
 from webmap.core.registry import map_modules
 from webmap.features.layers.grid_picture import Palette, check_palette
 from webmap.features.layers.grid_tiles import GridTiles
