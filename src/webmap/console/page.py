@@ -13,11 +13,10 @@ from typing import Any, ClassVar
 import webmap
 from webmap import Bridge, Map, Page, RobotConfig
 from webmap.base.map_file import cell_at
-from webmap.console.bar import BridgeList, RefusedList
+from webmap.console.bar import BridgeList, OperatorName, RefusedList
 from webmap.console.card_parts import RobotHealth
 from webmap.console.console import Console, robot_now
 from webmap.console.floor import Floor, load_floor
-from webmap.console.operator_name import OperatorName
 from webmap.console.robot_card import RobotButtons, RobotCard
 from webmap.console.robot_list import RobotList
 from webmap.console.robot_looks import make_robot

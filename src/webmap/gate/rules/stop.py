@@ -70,7 +70,8 @@ class StopLatch:
         self._key = key
         self._emit = emit
         self._number = 0
-        self._saved = True
+        self.settled = True
+        """Whether no save is pending."""
         self._save_next = False
         self._saving: Press | None = None
         self._ids: set[str] = set()
@@ -93,7 +94,7 @@ class StopLatch:
 
     def set(self, press: Press) -> None:
         """Activate STOP, with ``press`` as the newest press."""
-        waiting = self.on and not self._saved
+        waiting = self.on and not self.settled
         self.press = press
         if waiting:  # one write at a time; the next one has the newest press
             self._save_next = True
@@ -111,12 +112,7 @@ class StopLatch:
         if press is None or press == self.press:
             return False
         # A press that is being saved, or could not be saved, is newer than the file.
-        return self._saved and not (self.on and self.trouble)
-
-    @property
-    def settled(self) -> bool:
-        """Whether no save is pending."""
-        return self._saved
+        return self.settled and not (self.on and self.trouble)
 
     def drop(self) -> None:
         """Deactivate STOP here only; another gate is responsible for the file."""
@@ -148,7 +144,7 @@ class StopLatch:
         """Note the result of a save; only the newest save counts."""
         if event.number != self._number:
             return
-        self._saved, self.trouble = True, event.error
+        self.settled, self.trouble = True, event.error
         self.shown = self._saving
         if self._save_next:
             self.save()
@@ -158,7 +154,7 @@ class StopLatch:
     def save(self) -> None:
         """Save the current state."""
         self._number += 1
-        self._saved, self.trouble, self._save_next = False, None, False
+        self.settled, self.trouble, self._save_next = False, None, False
         self._saving = self.press
         if self.press is not None:
             self._ids.add(self.press.id)
