@@ -30,8 +30,7 @@ if TYPE_CHECKING:
     from webmap.base.identifiers import generate_id
     from webmap.config.robot import RobotConfig
     from webmap.core.extendable import Extendable
-    from webmap.core.layer import Layer
-    from webmap.core.map import Map
+    from webmap.core.map import Layer, Map
     from webmap.core.page import Page
     from webmap.core.pictures import Picture
     from webmap.core.refusals import refusals
@@ -103,7 +102,7 @@ _HOMES = {
     "Element": "webmap.scene.element:Element",
     "Extendable": "webmap.core.extendable:Extendable",
     "FoundTopic": "webmap.modules.declaration:FoundTopic",
-    "Layer": "webmap.core.layer:Layer",
+    "Layer": "webmap.core.map:Layer",
     "Map": "webmap.core.map:Map",
     "MapLayer": "webmap.modules.map_layer:MapLayer",
     "Namespace": "webmap.core.registry:Namespace",

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import webmap
 from webmap import html, svg
-from webmap.core.layer import Layer
+from webmap.core.map import Layer
 
 
 class Band(Layer):

@@ -15,7 +15,7 @@ from equipment.waiting import wait_for
 from equipment.webmap_process import simulator
 from webmap import Bridge
 from webmap.console import Console, make_robot
-from webmap.core.layer import Layer
+from webmap.core.map import Layer
 from webmap.discovery import FoundRobot, Guess, discover
 from webmap.discovery.findings import ROLES
 from webmap.discovery.newcomers import Newcomers, News

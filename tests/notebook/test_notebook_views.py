@@ -13,8 +13,8 @@ import webmap
 from equipment.waiting import wait_for
 from webmap.base.errors import ConfigError
 from webmap.core.runtime import runtime
-from webmap.notebook import views as views_module
-from webmap.notebook.front_end import esm
+from webmap.notebook import widget as widget_module
+from webmap.notebook.widget import esm
 from webmap.server.outbox import FRAMES
 
 HELLO = {"op": "hello", "page": "a-view-1", "url": "/", "width": 600, "height": 400}
@@ -147,7 +147,7 @@ def test_a_closed_widget_closes_all_its_pages(shown):
 
 
 def test_the_view_that_was_silent_longest_yields_to_a_new_one(shown, monkeypatch):
-    monkeypatch.setattr(views_module, "MOST_VIEWS", 2)
+    monkeypatch.setattr(widget_module, "MOST_VIEWS", 2)
     first, second = shown.open("a-view-1"), shown.open("a-view-2")
     shown.send({"op": "seen", "frame": 0}, "a-view-1")
     shown.open("a-view-3")
@@ -156,7 +156,7 @@ def test_the_view_that_was_silent_longest_yields_to_a_new_one(shown, monkeypatch
 
 
 def test_a_view_that_stays_silent_is_closed(shown, monkeypatch):
-    monkeypatch.setattr(views_module, "SILENT_S", 0.2)
+    monkeypatch.setattr(widget_module, "SILENT_S", 0.2)
     page = shown.open()
     wait_for(lambda: page.closed)
 
@@ -220,5 +220,5 @@ def test_without_the_extra_the_error_names_it():
 def test_the_objects_of_a_kernel_are_left_to_the_collector(monkeypatch):
     calls = []
     monkeypatch.setattr(gc, "freeze", lambda: calls.append("freeze"))
-    views_module.NotebookPages().built()
+    widget_module.NotebookPages().built()
     assert calls == []

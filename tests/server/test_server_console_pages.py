@@ -10,7 +10,7 @@ from webmap import Bridge, Robot, RobotConfig
 from webmap.console import make_robot
 from webmap.console.console import Console
 from webmap.console.page import build as build_console
-from webmap.core.layer import Layer
+from webmap.core.map import Layer
 from webmap.features.log.rosout import RosoutPanel, log_of
 from webmap.server import open_pages as host_module
 

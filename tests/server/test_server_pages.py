@@ -15,7 +15,7 @@ from equipment.waiting import wait_for
 from webmap.base.errors import MotionError
 from webmap.base.scope import Removal, keep
 from webmap.core.frame_pace import FramePace
-from webmap.core.layer import Layer
+from webmap.core.map import Layer
 from webmap.core.operators import Viewer
 from webmap.features.layers.laser_scanner import LaserScanner, SweepMsg
 from webmap.ros.rosbridge.events import Publish

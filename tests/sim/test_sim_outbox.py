@@ -1,7 +1,7 @@
 from simulated import Bench
 
+from webmap.ros.rosbridge.server.client import Outbox
 from webmap.ros.rosbridge.server.encode import Publication
-from webmap.ros.rosbridge.server.operation import Outbox
 
 
 def publication(topic, number):

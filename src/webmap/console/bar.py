@@ -1,17 +1,18 @@
-"""Lists that unfold from the page's bar: bridges and refused messages."""
+"""The page's bar: lists of bridges and of refused messages, and the person's name."""
 
+import logging
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING
+from typing import Any, ClassVar
 
-from webmap import html, refusals
+from webmap import Bridge, Element, Map, html, refusals
 from webmap.base.text import counted
 from webmap.console.robot_looks import icon
 from webmap.poses.frames import frame_faults
 
-if TYPE_CHECKING:
-    from webmap import Bridge, Element
+log = logging.getLogger("webmap.console")
 
 WORST = ("lost", "connecting", "late", "faulty")
 """States that are not well, the worst first; ``faulty`` is about the frames."""
@@ -36,11 +37,11 @@ class BridgeList:
 
     def __init__(
         self,
-        element: "Element",
-        bridges: Sequence["Bridge"],
-        button_of: Callable[["Bridge"], "Element"],
+        element: Element,
+        bridges: Sequence[Bridge],
+        button_of: Callable[[Bridge], Element],
         routers: Mapping[str, Callable[[], tuple[str, str]]],
-        waiting: "Element",
+        waiting: Element,
     ) -> None:
         self._bridges = bridges
         self._button_of = button_of
@@ -88,12 +89,12 @@ class BridgeList:
         for part in re.split(r"(?<=, )", text):
             self._text.append(html.span(text=part))
 
-    def _show(self, key: "Bridge | str", state: tuple[str, str]) -> None:
+    def _show(self, key: Bridge | str, state: tuple[str, str]) -> None:
         line, word = self._lines.get(key) or self._add(key)
         line.set("data-link", state[0])
         word.text = state[1]
 
-    def _add(self, key: "Bridge | str") -> "tuple[Element, Element]":
+    def _add(self, key: Bridge | str) -> tuple[Element, Element]:
         """Add the line of a bridge, or of the router at an address."""
         name, url = (key, key) if isinstance(key, str) else (key.name, key.url)
         word = html.span(class_="word")
@@ -107,7 +108,7 @@ class BridgeList:
         return line, word
 
 
-def describe_link(bridge: "Bridge") -> tuple[str, str]:
+def describe_link(bridge: Bridge) -> tuple[str, str]:
     """Return the page's name for a bridge's state, and a sentence that describes it."""
     if bridge.state == "open":
         late, faults = bridge.lag >= LATE, frame_faults(bridge)
@@ -167,7 +168,7 @@ class RefusedList:
         role: The role of the page's user.
     """
 
-    def __init__(self, element: "Element", role: str) -> None:
+    def __init__(self, element: Element, role: str) -> None:
         self._may = role != "viewer"
         self._text = html.span()
         self._newest = html.span(class_="newest")
@@ -196,7 +197,7 @@ class RefusedList:
             self._list.append(line(row.by, row.count, row.last, row.at))
 
 
-def line(by: str, count: int, last: str, at: datetime) -> "Element":
+def line(by: str, count: int, last: str, at: datetime) -> Element:
     """Return the number of one person's refused messages, and the last of them."""
     messages = counted(count, "message")
     return html.li(
@@ -206,3 +207,48 @@ def line(by: str, count: int, last: str, at: datetime) -> "Element":
         ),
         html.span(text=last, class_="refused-last"),
     )
+
+
+class OperatorName:
+    """Asks a person for a name and a place, and shows them; a module of maps.
+
+    Everything else works without a name. The name has a way of its own to WebMap: no
+    command carries it.
+
+    Args:
+        map: The map.
+    """
+
+    MAY_SEND: ClassVar[Mapping[str, str]] = {"name": "viewer", "place": "viewer"}
+
+    def __init__(self, map: Map) -> None:
+        self.map = map
+        self._shown: object = None
+        self.browser_part = map.add_browser_part(self, "console/operator_name.js", {})
+
+    def on_ready(self) -> None:
+        """Send the name: a page that was loaded again does not know it."""
+        self._shown = None
+        self.poll()
+
+    def poll(self) -> None:
+        """Send the page the name, if it has changed, also by another page."""
+        operator = self.map.page.viewer.operator
+        if operator != self._shown:
+            self._shown = operator
+            viewer = self.map.page.viewer
+            self.browser_part.send(
+                asdict(operator)
+                | {"label": str(operator), "role": viewer.role}
+                | {"signsOut": viewer.signs_out}
+            )
+
+    def on_message(self, message: dict[str, Any]) -> None:
+        """Set the name that the page states."""
+        name, place = message.get("name"), message.get("place")
+        if not isinstance(name, str) or not isinstance(place, str):
+            log.warning("%r: an unknown message of the page was ignored", self.map)
+            return
+        refused = self.map.page.viewer.rename(name, place)
+        self.poll()
+        self.browser_part.send({"refused": refused})

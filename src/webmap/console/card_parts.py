@@ -2,16 +2,13 @@
 
 import math
 import time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from webmap import html, svg
+from webmap import Element, Map, Robot, html, svg
 from webmap.base.geometry import Twist
 from webmap.base.text import counted
 from webmap.console.robot_looks import UNKNOWN, number, sentence
 from webmap.features.doctor.doctor_panel import entry
-
-if TYPE_CHECKING:
-    from webmap import Element, Map, Robot
 
 COLUMNS = ("Sent", "Arrived", "Measured")
 
@@ -37,7 +34,7 @@ class SpeedTable:
         self._reasons: tuple[str, ...] = ()
         self.elements: list[Element] = [self._table(), self._limits()]
 
-    def show(self, robot: "Robot") -> None:
+    def show(self, robot: Robot) -> None:
         """Show the three velocities, and the speed limit with its reasons."""
         report = robot.report
         sent = echoed = measured = None
@@ -71,7 +68,7 @@ class SpeedTable:
             tone = "warn" if warns else None
             self._why.append(html.span(text=reason, class_="badge", data_tone=tone))
 
-    def _table(self) -> "Element":
+    def _table(self) -> Element:
         head = html.tr(
             html.td(), *(html.th(text=name, scope="col") for name in COLUMNS)
         )
@@ -89,7 +86,7 @@ class SpeedTable:
         ]
         return html.table(html.thead(head), html.tbody(*rows), class_="speeds")
 
-    def _limits(self) -> "Element":
+    def _limits(self) -> Element:
         return html.dl(
             html.div(
                 html.dt(text="Speed limit"),
@@ -137,7 +134,7 @@ class OwnStop:
             self._test,
         ]
 
-    def show(self, robot: "Robot") -> None:
+    def show(self, robot: Robot) -> None:
         """Show a robot's command timeout, and the state of the stop test."""
         report = robot.report
         self.elements[0].set(hidden=report is None)
@@ -224,7 +221,7 @@ class GoalLine:
             shape, html.span(self._words, self._figures), class_="goal"
         )
 
-    def show(self, robot: "Robot") -> None:
+    def show(self, robot: Robot) -> None:
         """Show the state of a robot's goal; the line keeps its place without one."""
         goal = None if robot.report is None else robot.report.goal
         ended = robot.goal_ended_at
@@ -241,7 +238,7 @@ class GoalLine:
         self._figures.text = figures(robot)
 
 
-def figures(robot: "Robot") -> str:
+def figures(robot: Robot) -> str:
     """Return the figures of the goal of a robot, with units; empty without progress."""
     goal = None if robot.report is None else robot.report.goal
     if goal is None or goal.state not in ("under way", "cancelling"):
@@ -282,7 +279,7 @@ class RobotHealth:
         card: The page's element to append to.
     """
 
-    def __init__(self, map: "Map", card: "Element") -> None:
+    def __init__(self, map: Map, card: Element) -> None:
         self.map = map
         self._list = html.ul()
         self.element: Element = html.section(

@@ -3,15 +3,13 @@
 import time
 import weakref
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
+from webmap import Bridge, Map, Page, Robot
 from webmap.features.alerts.alert_store import AlertKeeper
 from webmap.features.alerts.alerts import Alerts, AlertWatch, conditions
 from webmap.features.incidents.incidents import Incidents
 from webmap.features.shift_log.hand_over import RobotNow
-
-if TYPE_CHECKING:
-    from webmap import Bridge, Map, Page, Robot
 
 Factory: TypeAlias = str | Callable[..., Any]
 """The name of a module, or a callable that makes one."""
@@ -33,7 +31,7 @@ class Console:
 
     def __init__(
         self,
-        given: "Sequence[Robot]" = (),
+        given: Sequence[Robot] = (),
         layers_off: Sequence[str] = (),
     ) -> None:
         self.given = tuple(given)
@@ -77,7 +75,7 @@ class Console:
         self.alert_keeper.begin()
         self.alert_watch.begin()
 
-    def shown_robots(self) -> "list[Robot]":
+    def shown_robots(self) -> list[Robot]:
         """Return the robots of both lists without those that were removed."""
         every = (*self.given, *self.robots)
         return [robot for robot in every if robot not in self._removed]
@@ -87,19 +85,19 @@ class Console:
         self.incidents = Incidents(self.shown_robots, self.alerts)
         self.incidents.begin()
 
-    def add(self, robot: "Robot") -> None:
+    def add(self, robot: Robot) -> None:
         """Show a robot on all open and future pages."""
         self.robots.append(robot)
         for map in self._maps:
             map.add_robot(robot)
 
-    def remove(self, robot: "Robot") -> None:
+    def remove(self, robot: Robot) -> None:
         """Remove a robot from every page until a new pose of the robot arrives."""
         self._removed[robot] = time.monotonic()
         for map in self._maps:
             map.remove_robot(robot)
 
-    def forget(self, robot: "Robot") -> None:
+    def forget(self, robot: Robot) -> None:
         """Remove a robot for good."""
         self.robots = [other for other in self.robots if other is not robot]
         self._removed.pop(robot, None)
@@ -115,7 +113,7 @@ class Console:
                 for map in self._maps:
                     map.add_robot(robot)
 
-    def add_grid(self, bridge: "Bridge", topic: str, **options: Any) -> bool:
+    def add_grid(self, bridge: Bridge, topic: str, **options: Any) -> bool:
         """Show a map under the robots on all pages; a map shown before stays unchanged.
 
         Args:
@@ -190,7 +188,7 @@ class Console:
         """
         self._modules[name] = {**self._modules.get(name, {}), **options}
 
-    def opened(self, page: "Page") -> None:
+    def opened(self, page: Page) -> None:
         """Show everything that was added until now on a newly filled page."""
         self._pages.add(page)
         for map in page.maps:
@@ -205,12 +203,10 @@ class Console:
                 map.add_robot(robot)
 
     @property
-    def _maps(self) -> "list[Map]":
+    def _maps(self) -> list[Map]:
         return [map for page in list(self._pages) for map in page.maps]
 
-    def _show_grids(
-        self, map: "Map", *, only: "tuple[Bridge, str] | None" = None
-    ) -> None:
+    def _show_grids(self, map: Map, *, only: tuple[Bridge, str] | None = None) -> None:
         for (bridge, topic), options in self.grids.items():
             if only not in (None, (bridge, topic)):
                 continue
@@ -223,7 +219,7 @@ class Console:
 
 
 def _add_module(
-    name: Factory, args: tuple[Any, ...], options: dict[str, Any], map: "Map"
+    name: Factory, args: tuple[Any, ...], options: dict[str, Any], map: Map
 ) -> None:
     try:
         map.add_module(name, *args, **options)
@@ -231,7 +227,7 @@ def _add_module(
         map.report_error(f"{name} is not shown: {error}")
 
 
-def robot_now(robot: "Robot") -> RobotNow:
+def robot_now(robot: Robot) -> RobotNow:
     """Return a robot with the reason why it is out of service, if it is."""
     texts = conditions(robot)
     why = [texts[kind] for kind in OUT if kind in texts]

@@ -8,15 +8,15 @@ import math
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import webmap
+from webmap import Bridge, Map, Page, RobotConfig
 from webmap.base.map_file import cell_at
-from webmap.console.bar import BridgeList, RefusedList
+from webmap.console.bar import BridgeList, OperatorName, RefusedList
 from webmap.console.card_parts import RobotHealth
 from webmap.console.console import Console, robot_now
 from webmap.console.floor import Floor, load_floor
-from webmap.console.operator_name import OperatorName
 from webmap.console.robot_card import RobotButtons, RobotCard
 from webmap.console.robot_list import RobotList
 from webmap.console.robot_looks import make_robot
@@ -28,9 +28,6 @@ from webmap.features.incidents.incidents import IncidentButton
 from webmap.features.selection.several_robots import SeveralRobots
 from webmap.features.shift_log.hand_over import HTML, HandOver
 from webmap.features.shift_log.shift_panel import ShiftPanel
-
-if TYPE_CHECKING:
-    from webmap import Bridge, Map, Page, RobotConfig
 
 log = logging.getLogger("webmap.console")
 
@@ -49,8 +46,8 @@ PERIOD = 0.25
 
 
 def open_console(
-    bridges: Sequence["Bridge"],
-    robots: Sequence["RobotConfig"],
+    bridges: Sequence[Bridge],
+    robots: Sequence[RobotConfig],
     *,
     floor: Path | None = None,
     title: str = PRODUCT,
@@ -91,12 +88,12 @@ def open_console(
         opened.record_incidents()
 
     @webmap.page("/", html="console.html", title=title)
-    def console(page: "Page") -> None:
+    def console(page: Page) -> None:
         build(page, bridges, opened, plan, title, kept_under)
         opened.opened(page)
 
     @webmap.page(HAND_OVER, html=HTML)
-    def hand_over(page: "Page") -> None:
+    def hand_over(page: Page) -> None:
         HandOver(
             page,
             lambda: [robot_now(robot) for robot in opened.shown_robots()],
@@ -107,8 +104,8 @@ def open_console(
 
 
 def build(
-    page: "Page",
-    bridges: Sequence["Bridge"],
+    page: Page,
+    bridges: Sequence[Bridge],
     opened: Console,
     floor: Floor | None,
     title: str,
@@ -196,7 +193,7 @@ def _folder_for_this_process() -> Path:
     return Path(folder.name)
 
 
-def show_floor(map: "Map", floor: Floor) -> None:
+def show_floor(map: Map, floor: Floor) -> None:
     """Place a floor plan for each theme, light and dark; map.css shows one."""
     for name, file in (("day", floor.day), ("night", floor.night)):
         image = map.add_image(str(file), floor.x, floor.y, floor.width, floor.height)
@@ -242,7 +239,7 @@ class Frame:
 
     MAY_SEND: ClassVar[Mapping[str, str]] = {"follow": "viewer"}
 
-    def __init__(self, map: "Map", title: str, floor: "Floor | None") -> None:
+    def __init__(self, map: Map, title: str, floor: Floor | None) -> None:
         self.map = map
         self._floor = floor
         self._bounds = None if floor is None else floor.bounds
@@ -336,7 +333,7 @@ class Layout:
 
     def __init__(
         self,
-        map: "Map",
+        map: Map,
         *,
         of: str = "",
         place: str = "",
@@ -369,7 +366,7 @@ class CostmapNames:
     ``global_costmap/costmap``.
     """
 
-    def __init__(self, map: "Map") -> None:
+    def __init__(self, map: Map) -> None:
         self.map = map
 
     def poll(self) -> None:

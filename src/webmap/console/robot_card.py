@@ -1,18 +1,14 @@
 """The card of the selected robot: pose, motion and actions."""
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
-from webmap import html
+from webmap import Element, Map, Robot, html
 from webmap.console.card_parts import GoalLine, OwnStop, SpeedTable
 from webmap.console.robot_list import AGE_LIMIT, StateShape, StateWords
 from webmap.console.robot_looks import UNKNOWN, heading, icon, look_of, number, sentence
 from webmap.features.cameras.camera_panel import CameraViews
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from webmap import Element, Map, Robot
 
 ACTIONS = (
     ("send", "icon-send", "Send goal…"),
@@ -62,14 +58,14 @@ class RobotCard:
 
     def __init__(
         self,
-        map: "Map",
-        element: "Element",
+        map: Map,
+        element: Element,
         *,
-        aim_goal: "Callable[[], object]",
-        forget_goal: "Callable[[Robot], object]",
-        aim_pose: "Callable[[], object]",
+        aim_goal: Callable[[], object],
+        forget_goal: Callable[[Robot], object],
+        aim_pose: Callable[[], object],
         most: tuple[float, float],
-        remove: "Callable[[Robot], object]",
+        remove: Callable[[Robot], object],
     ) -> None:
         self.map = map
         self._remove = remove
@@ -192,7 +188,7 @@ class RobotCard:
         self._cameras.show(None)
         self._robot = self._feed = None
 
-    def _parts(self) -> "list[Element]":
+    def _parts(self) -> list[Element]:
         quiet = {"type": "button", "class_": "button square quiet"}
         close = html.button(
             icon("icon-close"), aria_label="Deselect the robot", **quiet
@@ -234,7 +230,7 @@ class RobotCard:
             self.more,
         ]
 
-    def _facts(self) -> "Element":
+    def _facts(self) -> Element:
         return html.dl(
             fact("x", self._x, " m"),
             fact("y", self._y, " m"),
@@ -259,7 +255,7 @@ class RobotCard:
 class RobotTriggers:
     """Forwards a robot's triggers to a card; a module of robots."""
 
-    def __init__(self, robot: "Robot", card: RobotCard) -> None:
+    def __init__(self, robot: Robot, card: RobotCard) -> None:
         self.robot = robot
         self._card = card
 
@@ -280,21 +276,21 @@ class RobotTriggers:
         self._card.show_battery(battery)
 
 
-def fact(name: str, value: "Element", unit: str) -> "Element":
+def fact(name: str, value: Element, unit: str) -> Element:
     """Return a value with its name above and its unit after it."""
     return html.div(
         html.dt(text=name), html.dd(value, html.span(text=unit, class_="minor unit"))
     )
 
 
-def action(act: str, symbol: str, words: str) -> "Element":
+def action(act: str, symbol: str, words: str) -> Element:
     """Return a button whose presses console.js handles."""
     return html.button(
         icon(symbol), words, type="button", class_="button", data_act=act
     )
 
 
-def stop_test() -> "Element":
+def stop_test() -> Element:
     """Return the button that takes control, and then runs the stop test."""
     words = [html.span(text=text, class_=name) for name, text in TEST_WORDS]
     return html.button(
@@ -318,7 +314,7 @@ class RobotButtons:
         card: The page's element to append to.
     """
 
-    def __init__(self, map: "Map", card: "Element") -> None:
+    def __init__(self, map: Map, card: Element) -> None:
         self.map = map
         self.element = html.section(class_="card-buttons", aria_label="Buttons")
         card.append(self.element)

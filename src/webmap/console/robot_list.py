@@ -1,14 +1,11 @@
 """The list of robots: name, age of the pose, battery, operator."""
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from webmap import html, svg
+from webmap import Element, Map, Robot, html, svg
 from webmap.config.robot import BATTERY_LOW
 from webmap.console.robot_looks import GROUPS, LOOKS, battery_tone, needs_person
-
-if TYPE_CHECKING:
-    from webmap import Element, Map, Robot
 
 FULL = 18.0
 """Width of the charge in the battery symbol when the battery is full."""
@@ -61,7 +58,7 @@ class RobotList:
     """
 
     def __init__(
-        self, map: "Map", element: "Element", *, none: "Element", search: "Element"
+        self, map: Map, element: Element, *, none: Element, search: Element
     ) -> None:
         self.map = map
         self.element = element
@@ -76,7 +73,7 @@ class RobotList:
         for row in tuple(self._rows.values()):
             self.on_remove_robot(row.robot)
 
-    def on_add_robot(self, robot: "Robot") -> None:
+    def on_add_robot(self, robot: Robot) -> None:
         """Add the robot's line."""
         row = robot.add_module(Row, self.map)
         self._rows[id(robot)] = row
@@ -84,7 +81,7 @@ class RobotList:
         row.on_state()
         self._show_count()
 
-    def on_remove_robot(self, robot: "Robot") -> None:
+    def on_remove_robot(self, robot: Robot) -> None:
         """Remove the robot's line."""
         row = self._rows.pop(id(robot), None)
         if row is not None:
@@ -114,7 +111,7 @@ class RobotList:
 class Row:
     """One robot's line in the list on one page; a module of robots."""
 
-    def __init__(self, robot: "Robot", map: "Map") -> None:
+    def __init__(self, robot: Robot, map: Map) -> None:
         self.robot = robot
         self._person = map.page.viewer.operator.person
         self._shape = StateShape()
@@ -208,7 +205,7 @@ class StateWords:
         element: The element to fill.
     """
 
-    def __init__(self, element: "Element") -> None:
+    def __init__(self, element: Element) -> None:
         self.element = element.set("class", "state")
         self._shown: object = None
         self._activity = html.span(class_="holder")
@@ -217,7 +214,7 @@ class StateWords:
         old = html.span(text="Stale data", class_="old")
         element.append(old, self._activity, self._own)
 
-    def show(self, robot: "Robot", person: str) -> None:
+    def show(self, robot: Robot, person: str) -> None:
         """Show the state of a robot on a page of a person."""
         state = robot.shown_state
         if state == self._shown:

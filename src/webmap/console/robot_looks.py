@@ -7,16 +7,13 @@ import math
 import re
 import zlib
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import webmap
-from webmap import Element, svg
+from webmap import Bridge, Element, Robot, RobotConfig, svg
 from webmap.base import geometry
 from webmap.base.audience import audience
-
-if TYPE_CHECKING:
-    from webmap import Bridge, Robot, RobotConfig
-    from webmap.config.robot import PictureConfig
+from webmap.config.robot import PictureConfig
 
 UNKNOWN = "\N{EN DASH}"
 """Shown in place of an unknown number."""
@@ -89,12 +86,12 @@ def icon(symbol: str) -> Element:
     return svg.svg(svg.use(href=f"#{symbol}"), class_="icon", aria_hidden="true")
 
 
-def look_of(robot: "Robot") -> Look:
+def look_of(robot: Robot) -> Look:
     """Return the symbol, the tone and the group of the robot's state."""
     return LOOKS[robot.shown_state.name]
 
 
-def needs_person(robot: "Robot") -> bool:
+def needs_person(robot: Robot) -> bool:
     """Return whether the robot's state ends only when a person does something."""
     return look_of(robot).group in NEED_A_PERSON
 
@@ -132,10 +129,10 @@ def sentence(text: str) -> str:
 
 
 def make_robot(
-    config: "RobotConfig",
-    bridges: "Mapping[str, Bridge] | Iterable[Bridge]",
+    config: RobotConfig,
+    bridges: Mapping[str, Bridge] | Iterable[Bridge],
     picture: str = "",
-) -> "Robot":
+) -> Robot:
     """Return a robot with the modules that the console shows.
 
     Args:
@@ -160,7 +157,7 @@ def make_robot(
     return robot
 
 
-def draw_picture(robot: "Robot", picture: "PictureConfig | None", href: str) -> None:
+def draw_picture(robot: Robot, picture: PictureConfig | None, href: str) -> None:
     """Draw a robot that the console has made as another picture, or as its usual body.
 
     Args:
@@ -202,13 +199,13 @@ def robot_model() -> Element:
     )
 
 
-def picture_reach(picture: "PictureConfig") -> float:
+def picture_reach(picture: PictureConfig) -> float:
     """Return the greatest distance from robot origin to picture edge, in metres."""
     half = math.hypot(picture.width, picture.height) / 2
     return half + math.hypot(picture.x, picture.y)
 
 
-def picture_model(picture: "PictureConfig", href: str) -> Element:
+def picture_model(picture: PictureConfig, href: str) -> Element:
     """Return a model made of a picture, with the same marks as any other robot.
 
     Args:
@@ -256,7 +253,7 @@ class StateMark:
     ``map.css`` has sizes and places, in pixels.
     """
 
-    def __init__(self, robot: "Robot") -> None:
+    def __init__(self, robot: Robot) -> None:
         self.robot = robot
         half = -ACROSS / 2
         self._use = svg.use(x=half, y=half, width=ACROSS, height=ACROSS)

@@ -11,18 +11,15 @@ import hashlib
 import json
 import logging
 from pathlib import Path
-from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Pose
 from webmap.base.plain_files import LARGEST_STATE, read_file, write_file
+from webmap.core.robot import Robot
 from webmap.gate.locks import state_folder
 from webmap.poses.alignment import alignment, alignments, numbers
 from webmap.ros.bridge import Bridge
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
 
 log = logging.getLogger("webmap.alignment")
 
@@ -54,7 +51,7 @@ class AlignmentStore:
         if saved is not None:
             alignments.set(bridge, saved)
 
-    def restore(self, robot: "Robot") -> None:
+    def restore(self, robot: Robot) -> None:
         """Apply the saved alignments of a robot and of its bridge."""
         bridge = robot.pose_source.bridge
         if bridge is None or robot.motion.is_far:  # then its agent aligns it

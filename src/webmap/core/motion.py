@@ -24,7 +24,7 @@ from webmap.config.motion import (
     TwistConfig,
 )
 from webmap.config.reading import Config
-from webmap.core.robot_names import named_robots
+from webmap.core.operators import named_robots
 from webmap.gate.protocol import RobotReport, RobotSpec
 from webmap.gate.rules.obedience import MOST_NAME, MOST_NODES
 from webmap.gate.specs import PLANE, axes_of, resolved

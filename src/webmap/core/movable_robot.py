@@ -6,7 +6,6 @@ import inspect
 import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import (
-    TYPE_CHECKING,
     Any,
     ClassVar,
     Concatenate,
@@ -23,6 +22,7 @@ from webmap.base.scope import no_scope
 from webmap.config.motion import COVARIANCE, MOTION, NAVIGATE_TO_POSE
 from webmap.config.reading import read_key
 from webmap.config.robot import LINKED, RobotConfig
+from webmap.core.base_page import BasePage
 from webmap.core.extendable import Extendable
 from webmap.core.module_arguments import WrongArguments, check_arguments
 from webmap.core.motion import RobotMotion
@@ -30,9 +30,6 @@ from webmap.core.registry import Namespace
 from webmap.gate.protocol import RobotReport
 from webmap.gate.rules.goals import OVER
 from webmap.ros.bridge import Bridge
-
-if TYPE_CHECKING:
-    from webmap.core.base_page import BasePage
 
 P = ParamSpec("P")
 D = TypeVar("D", bound="MovableRobot")
@@ -443,7 +440,7 @@ class MovableRobot(Extendable):
         position: Position,
         orientation: Orientation,
         *,
-        by: "BasePage | None" = None,
+        by: BasePage | None = None,
     ) -> None:
         """Send the robot to a goal in the plane, by its own navigation.
 

@@ -19,11 +19,14 @@ from typing import Protocol
 
 from webmap.base.roles import ALL_ROBOTS, Role, checked_patterns, covers, includes
 from webmap.base.text import isolated
-from webmap.core.robot_names import named_robots
 from webmap.core.shift_log import shift_log
 from webmap.gate.protocol import Identity
 
 log = logging.getLogger("webmap.operators")
+
+named_robots: dict[str, tuple[str, tuple[str, ...]]] = {}
+"""The name and the tags of each robot by its id, for the rights of people; read by all
+threads."""
 
 MOST_NAME, MOST_PLACE = 34, 24
 """Characters of a name and of a place; the rest is cut.

@@ -14,9 +14,9 @@ from webmap.base.roles import NOT_YOURS, ROLES, Role, covers, who_may
 from webmap.base.scope import Removal, keep
 from webmap.core.base_page import BasePage, page_of
 from webmap.core.extendable import Extendable
+from webmap.core.operators import named_robots
 from webmap.core.pictures import pixels_across
 from webmap.core.registry import Namespace
-from webmap.core.robot_names import named_robots
 from webmap.scene import svg
 from webmap.scene.element import Element, Handler
 from webmap.scene.node import Fragment

@@ -71,7 +71,12 @@ def _merged(robot: FoundRobot, known: FoundRobot) -> FoundRobot:
     if "pose" not in known.guesses and (known.topic("odometry") or framed):
         guesses.pop("pose", None)
     if not leads_further(robot, known):
-        robot = with_frames_of(robot, known)
+        robot = replace(
+            robot,
+            base_frame=known.base_frame,
+            root_frame=known.root_frame,
+            above=known.above,
+        )
     return replace(robot, guesses=guesses)
 
 
@@ -88,16 +93,6 @@ def leads_further(robot: FoundRobot, known: FoundRobot) -> bool:
     if known.root_frame not in above or robot.root_frame not in above:
         return False
     return above.index(robot.root_frame) > above.index(known.root_frame)
-
-
-def with_frames_of(robot: FoundRobot, known: FoundRobot) -> FoundRobot:
-    """Return ``robot``, placed by the frames that are ``known``."""
-    return replace(
-        robot,
-        base_frame=known.base_frame,
-        root_frame=known.root_frame,
-        above=known.above,
-    )
 
 
 def _more(robot: FoundRobot, known: FoundRobot) -> tuple[TopicRole, ...]:

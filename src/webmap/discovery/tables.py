@@ -46,7 +46,8 @@ def report(url: str, findings: Findings) -> str:
     robots = counted(number, "robot") if number else "no robots"
     lines = [f"{url}: {DIALECTS[findings.dialect]}, {robots}"]
     for robot in findings.robots:
-        lines += ["", *robot_table(robot), *layer_table(robot, findings)]
+        layers = findings.layers.get(robot.namespace, Layers())
+        lines += ["", *robot_table(robot), *drawn_table(robot.namespace, layers)]
     lines += ["", *findings.notes]
     if findings.robots:
         lines.append(OVERRULE)
@@ -81,11 +82,6 @@ def robot_table(robot: FoundRobot) -> list[str]:
         lines.append(f"  not found: {', '.join(missing)}")
     lines += [f"  note: {note}" for note in robot.notes]
     return lines
-
-
-def layer_table(robot: FoundRobot, findings: Findings) -> list[str]:
-    """Return the rows of :func:`drawn_table` for a robot of the findings."""
-    return drawn_table(robot.namespace, findings.layers.get(robot.namespace, Layers()))
 
 
 def drawn_table(namespace: str, layers: Layers) -> list[str]:

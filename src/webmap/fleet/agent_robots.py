@@ -3,10 +3,11 @@
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
 import webmap
+from webmap import Bridge
 from webmap.config.checks import Mistakes
 from webmap.config.fleet import read_fleet
 from webmap.config.motion import MotionConfig
@@ -22,9 +23,6 @@ from webmap.ros.names import web_socket_url
 from webmap.ros.rosbridge.checks import is_loopback, listening_addresses
 from webmap.ros.tf import Buffer
 
-if TYPE_CHECKING:
-    from webmap import Bridge
-
 log = logging.getLogger("webmap.agent")
 
 
@@ -38,7 +36,7 @@ class AgentRobot(NamedTuple):
 class AgentRobots(NamedTuple):
     """The robots of an agent and the maps under them, behind one rosbridge."""
 
-    bridge: "Bridge"
+    bridge: Bridge
     robots: Callable[[], list[AgentRobot]]
     """Returns the robots that are known now."""
     grids: Callable[[], Mapping[str, dict[str, Any]]]

@@ -4,10 +4,10 @@ import asyncio
 import logging
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import msgspec
 
+from webmap import Bridge
 from webmap.base.echo import notify
 from webmap.base.errors import BridgeError
 from webmap.base.lifecycle import lifecycle
@@ -20,11 +20,8 @@ from webmap.discovery.robots import host_name
 from webmap.discovery.tf_robots import Trees
 from webmap.fleet.overrides import MOST_CAMERAS
 from webmap.fleet.robot_options import DrawableTopics, drawable_topics
+from webmap.fleet.view_robots import ViewRobot, ViewRobots
 from webmap.modules.declaration import declarations
-
-if TYPE_CHECKING:
-    from webmap import Bridge
-    from webmap.fleet.view_robots import ViewRobot, ViewRobots
 
 log = logging.getLogger("webmap.cli")
 
@@ -48,9 +45,7 @@ class PeriodicSearch(ABC):
 
     """
 
-    def __init__(
-        self, bridge: "Bridge", topics: Mapping[str, str] | None = None
-    ) -> None:
+    def __init__(self, bridge: Bridge, topics: Mapping[str, str] | None = None) -> None:
         self.bridge = bridge
         self._given_topics = topics
         self._task: asyncio.Task[None] | None = None
@@ -129,9 +124,9 @@ class RobotSearch(PeriodicSearch):
 
     def __init__(
         self,
-        bridge: "Bridge",
+        bridge: Bridge,
         known: Iterable[FoundRobot],
-        on_news: Callable[[News, "Bridge"], object],
+        on_news: Callable[[News, Bridge], object],
     ) -> None:
         super().__init__(bridge)
         self._newcomers = Newcomers(known)
@@ -165,10 +160,10 @@ class LayerSearch(PeriodicSearch):
 
     def __init__(
         self,
-        bridge: "Bridge",
-        shown: "ViewRobots",
+        bridge: Bridge,
+        shown: ViewRobots,
         *,
-        given: "Sequence[ViewRobot]" = (),
+        given: Sequence[ViewRobot] = (),
         topics: Mapping[str, str] | None = None,
     ) -> None:
         super().__init__(bridge, topics)
@@ -211,7 +206,7 @@ class LayerSearch(PeriodicSearch):
             self._place(robot, offered)
             self._draw(robot, offered.layers, offered.namespace)
 
-    def _place(self, robot: "ViewRobot", offered: DrawableTopics) -> None:
+    def _place(self, robot: ViewRobot, offered: DrawableTopics) -> None:
         """Draw a robot in the frame of the map, like a found robot."""
         found, known = offered.found, self._placed.get(robot)
         if (
@@ -230,7 +225,7 @@ class LayerSearch(PeriodicSearch):
 
     def _draw(
         self,
-        robot: "ViewRobot",
+        robot: ViewRobot,
         layers: Layers,
         namespace: str,
         cameras: Sequence[str] = (),
@@ -261,7 +256,7 @@ def on_page(layers: Layers, grid: bool) -> Layers:
     return Layers(tuple(drawn), layers.left_out)
 
 
-def _cameras_left_out(robot: "ViewRobot", found: FoundRobot) -> list[str]:
+def _cameras_left_out(robot: ViewRobot, found: FoundRobot) -> list[str]:
     """Return the topics of cameras beyond the number that is shown."""
     shown = {camera.topic for camera in robot.config.cameras}
     if len(shown) < MOST_CAMERAS:

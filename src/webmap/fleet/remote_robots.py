@@ -8,11 +8,11 @@ from collections import deque
 from collections.abc import AsyncIterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING
 
 import msgspec
 
 import webmap
+from webmap import Bridge, Robot
 from webmap.agents import address
 from webmap.agents.announcements import (
     MOST_GRIDS,
@@ -47,9 +47,6 @@ from webmap.fleet.robot_files import (
 )
 from webmap.gate.lanes.budget import Budget
 from webmap.poses.alignment import align_bridge
-
-if TYPE_CHECKING:
-    from webmap import Bridge, Robot
 
 log = logging.getLogger("webmap.agent")
 
@@ -90,7 +87,7 @@ MOST_COMPLAINTS = 20
 
 @dataclass(eq=False)
 class _RemoteRobot:
-    robot: "Robot"
+    robot: Robot
     config: RobotConfig
     picture: PictureConfig | None = None
     """The picture that its agent has."""
@@ -103,7 +100,7 @@ class RemoteAgent:
     """An agent of which a display has heard."""
 
     name: str
-    bridge: "Bridge"
+    bridge: Bridge
     beacon: Beacon
     about: str = ""
     """The description that is shown."""
@@ -116,11 +113,11 @@ class RemoteAgent:
         default_factory=lambda: Budget(NEW_ROBOTS, burst=MOST_ROBOTS / NEW_ROBOTS)
     )
     """How many robots it may add."""
-    describing: "asyncio.Task[None] | None" = None
+    describing: asyncio.Task[None] | None = None
     complaints: set[str] = field(default_factory=set)
     pictures: dict[str, str] = field(default_factory=dict)
     """The URLs of the pictures of its robots, by name; "" for what is no picture."""
-    drawing: "asyncio.Task[None] | None" = None
+    drawing: asyncio.Task[None] | None = None
 
     def may_be_asked(self, now: float) -> bool:
         """Return whether it may be asked for its description now; note that it is."""
@@ -168,7 +165,7 @@ class RemoteAgents:
         """Why no agent can be found now."""
         return self._peer.trouble
 
-    def join(self, bridges: "list[Bridge]") -> None:
+    def join(self, bridges: list[Bridge]) -> None:
         """Add the bridges of the agents that are there, and of later ones."""
         for name, beacon in list(self._news.items()):
             self._get(name, beacon)
@@ -324,7 +321,7 @@ class RemoteAgents:
         agent: RemoteAgent,
         id: str,
         given: RobotConfig,
-        bridges: "dict[str, Bridge]",
+        bridges: dict[str, Bridge],
         console: Console,
     ) -> None:
         config, picture = config_from_agent(given, agent.bridge.url, id, bridges)
@@ -401,7 +398,7 @@ def _undrawn(agent: RemoteAgent) -> list[_RemoteRobot]:
     ]
 
 
-def find_agents(routers: Sequence[str], bridges: "list[Bridge]") -> list[RemoteAgents]:
+def find_agents(routers: Sequence[str], bridges: list[Bridge]) -> list[RemoteAgents]:
     """Return the agents of routers, after a moment in which those there are heard.
 
     Args:

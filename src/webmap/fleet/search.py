@@ -3,14 +3,15 @@
 import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
+from webmap import Bridge
 from webmap.base.echo import echo
 from webmap.base.errors import BridgeClosed, BridgeError
 from webmap.base.text import escaped
 from webmap.config.checks import same_name
 from webmap.config.robot import RobotConfig
+from webmap.console import Console
 from webmap.discovery import Findings, FoundRobot, discover
 from webmap.discovery.findings import free_name, unique_names
 from webmap.discovery.frames import receive_frames
@@ -33,10 +34,6 @@ from webmap.ros.names import (
     normalise_topic,
 )
 from webmap.ros.temporary_bridge import ask_topics
-
-if TYPE_CHECKING:
-    from webmap import Bridge
-    from webmap.console import Console
 
 LIST_ROBOTS = (
     "List each robot with --robot NAME:ODOM:CMD_VEL:SCAN, "
@@ -175,7 +172,7 @@ class FleetSearch:
     robots: list[Candidate] = field(default_factory=list)
     """Robots that were found."""
 
-    behind: "dict[Bridge, SearchResult]" = field(default_factory=dict)
+    behind: dict[Bridge, SearchResult] = field(default_factory=dict)
     """The findings of each bridge, before any settings."""
 
     overrides: Overrides = field(default_factory=Overrides)
@@ -213,7 +210,7 @@ class FleetSearch:
 
     def show(
         self,
-        console: "Console",
+        console: Console,
         *,
         grid: bool = True,
         only_given: bool = False,
@@ -243,7 +240,7 @@ class FleetSearch:
 
     def make_robots(
         self,
-        console: "Console",
+        console: Console,
         part_of: Callable[[RobotConfig], RobotConfig],
     ) -> ViewRobots:
         """Make the robots found now and later, without a page.
@@ -274,7 +271,7 @@ _services: list[object] = []
 
 
 def find_fleet(
-    bridges: Sequence["Bridge"],
+    bridges: Sequence[Bridge],
     given: Sequence[Candidate],
     *,
     wait: float,
@@ -328,7 +325,7 @@ def find_fleet(
 
 
 def fleet_of_options(
-    bridges: Sequence["Bridge"], given: Sequence[Candidate], *, wait: float
+    bridges: Sequence[Bridge], given: Sequence[Candidate], *, wait: float
 ) -> FleetSearch:
     """Return robots given with ``--robot``, with the findings of their bridges.
 

@@ -8,7 +8,7 @@ reason (latency, scan assist) is one more cap in the list.
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import msgspec
 from msgspec import structs
@@ -18,6 +18,7 @@ from webmap.base.geometry import Twist
 from webmap.config.checks import Mistakes
 from webmap.config.motion import MOTION, WRITING, MotionConfig, TwistConfig
 from webmap.config.reading import read
+from webmap.gate.events import Key, StopRecord
 from webmap.gate.protocol import RobotSpec
 from webmap.ros.names import (
     has_gate,
@@ -26,9 +27,6 @@ from webmap.ros.names import (
     same_type,
     split_type,
 )
-
-if TYPE_CHECKING:
-    from webmap.gate.events import Key, StopRecord
 
 Vector = tuple[float, float, float]
 
@@ -135,7 +133,7 @@ def check_twist_type(spec: RobotSpec, others: Iterable[RobotSpec]) -> None:
             )
 
 
-def key_of(spec: RobotSpec) -> "Key":
+def key_of(spec: RobotSpec) -> Key:
     """Return the key of the machine of a checked ``spec``.
 
     A robot without a velocity topic has the place of its goals as its key.
@@ -234,7 +232,7 @@ class Speed:
     why: tuple[str, ...]
 
 
-def caps_of(base: TwistConfig, tested: "StopRecord | None" = None) -> list[Cap]:
+def caps_of(base: TwistConfig, tested: StopRecord | None = None) -> list[Cap]:
     """Return the caps of the robot itself.
 
     Args:

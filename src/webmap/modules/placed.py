@@ -3,12 +3,12 @@
 import logging
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from webmap.base.audience import audience
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Affine, Pose, Vector3
 from webmap.base.scope import Removal, keep
+from webmap.core.robot import Robot
 from webmap.modules.sighting import Sighting, Sightings
 from webmap.poses.frames import delayed_problem
 from webmap.poses.placing import ProblemDelay
@@ -17,9 +17,6 @@ from webmap.ros.tf.transform import alike
 from webmap.scene import svg
 from webmap.scene.element import Element
 from webmap.scene.node import Child
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
 
 log = logging.getLogger("webmap.modules")
 
@@ -66,7 +63,7 @@ class Placed:
 
     def __init__(
         self,
-        robot: "Robot",
+        robot: Robot,
         *children: Child,
         class_: str,
         frame: str = "map",

@@ -1,15 +1,13 @@
 """Base class of layers that draw the messages of one topic of a robot."""
 
 from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from webmap.core.registry import robot_modules
+from webmap.core.robot import Robot
 from webmap.modules.layer_options import Seconds
 from webmap.modules.placed import Placed
 from webmap.modules.topic_layer import LEVEL, E, TopicLayer, label, origin
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
 
 
 class RobotLayer(TopicLayer):
@@ -40,7 +38,7 @@ class RobotLayer(TopicLayer):
     """Whether the drawing lies in the plane of its frame and tilts with it as a whole,
     so that :meth:`draw` need not transform points in space."""
 
-    robot: "Robot"
+    robot: Robot
 
     throttle: int = 200
     """The least time between two messages, in milliseconds."""
@@ -54,7 +52,7 @@ class RobotLayer(TopicLayer):
     frame = "map"
     x = y = angle = 0.0
 
-    def __init__(self, robot: "Robot", *args: Any, **options: Any) -> None:
+    def __init__(self, robot: Robot, *args: Any, **options: Any) -> None:
         self.robot = robot
         self._take_arguments(robot, *args, **options)
         self.placed = Placed(

@@ -4,7 +4,7 @@ import math
 from array import array
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import msgspec
 
@@ -14,6 +14,7 @@ from webmap.base.geometry import FARTHEST
 from webmap.base.processes import load_soon
 from webmap.core.problems import MessageProblems, ProblemOwner
 from webmap.core.registry import Namespace
+from webmap.core.robot import Robot
 from webmap.modules.declaration import Declaration, FoundTopic, usual_options
 from webmap.modules.layer_options import LayerOptions
 from webmap.ros.bridge import Bridge
@@ -23,11 +24,8 @@ from webmap.ros.subscriptions import Encoding
 from webmap.ros.tf import Transform
 from webmap.scene.element import Element
 
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
 
-
-def label(drawn: "Element", topic: str, robot: "Robot") -> None:
+def label(drawn: Element, topic: str, robot: Robot) -> None:
     """Name the topic of a drawing, so that viewers can switch the drawing on and off.
 
     Similar robots are switched together, so the robot's own namespace is left out:

@@ -1,5 +1,5 @@
 """The map in notebooks, by anywidget: for looking only, without a server.
 
-Open ``widget.py`` first. ``views.py`` has the pages of widgets in Python, and
-``widget.js`` what shows them. The connection is that of the notebook to its kernel.
+``widget.py`` has the widget and the pages of its views, and ``widget.js`` what shows
+them in the browser. The connection is that of the notebook to its kernel.
 """

@@ -2,7 +2,7 @@
  * The map in a notebook, over the notebook's own connection to its kernel.
  *
  * It only looks: its bundle has the picture and the view, and nothing that commands.
- * Python refuses every other message (`views.py`).
+ * Python refuses every other message (`widget.py`).
  */
 
 import { default as metreGrid } from "../features/view/metre_grid.js";

@@ -1,16 +1,45 @@
-"""``webmap.widget``: a map in a notebook."""
+"""``webmap.widget``: a map in a notebook.
 
+A widget has a view for each output cell that shows it: a page without rights, over the
+connection of the notebook. A message of a view has its ``view``, an identifier, and
+``text``, the message of a page; without a text the view has gone. A message to a view
+has one of these:
+
+- a frame as its first buffer, and in ``pictures`` those that the frame names;
+- ``unknown``: the view must send its hello again;
+- ``ended``: why the page was closed.
+"""
+
+import asyncio
+import base64
+import contextvars
+import functools
 import inspect
 import itertools
+import logging
+import re
+import time
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from webmap.base.errors import ConfigError, WebMapError
+from webmap.base.errors import ConfigError, WebMapError, WireError
 from webmap.core.base_page import PageEntry
+from webmap.core.operators import Viewer
 from webmap.core.page import PageFunction
 from webmap.core.runtime import runtime
-from webmap.notebook.front_end import esm, sheet
-from webmap.notebook.views import NotebookPages, Views
+from webmap.scene.wire.messages import (
+    PageHello,
+    Resync,
+    Seen,
+    Trouble,
+    Unseen,
+    ViewReport,
+    read_message,
+)
+from webmap.server.bundles import served_modules, served_sheets
+from webmap.server.files import IMAGES, NoSuchFile, Published
+from webmap.server.open_pages import OpenPages
 
 try:
     import anywidget
@@ -21,10 +50,207 @@ except ImportError:
         "pip install 'webmap[notebook]'"
     ) from None
 
+log = logging.getLogger("webmap.notebook")
+
+ALLOWED = (PageHello, Seen, Unseen, Resync, ViewReport, Trouble)
+"""What a view may send: that it has drawn a frame, what it shows, and failures. No
+event reaches a module or a handler."""
+
+LOOKER = Viewer("notebook", "a notebook", role="viewer")
+"""The viewer of all views. No view has a connection to the gate."""
+
+SILENT_S = 150.0
+"""Seconds after which a silent view is closed. A hidden tab may send once a minute."""
+
+MOST_ID = 64
+"""Characters of the identifier of a view."""
+
+MOST_VIEWS = 20
+"""Views of one widget; of more, the one that was silent longest is closed."""
+
+Send = Callable[[dict[str, Any], list[bytes]], object]
+"""Sends a message with buffers to all views of a widget."""
+
 LEAST_HEIGHT = 50
 
+START = "notebook/widget.js"
+
 _numbers = itertools.count(1)
-_pages: NotebookPages | None = None
+_PICTURE = re.compile(re.escape(IMAGES.encode()) + rb"([0-9a-f]{32})")
+
+
+class NotebookPages(OpenPages):
+    """The pages of all views. No view comes back, so a lost page is closed at once."""
+
+    def __init__(self) -> None:
+        self.published = Published()
+        self.entries: dict[str, PageEntry] = {}
+        super().__init__(runtime, self.entries, self.published, max_pages=1000)
+
+    @property
+    def kept_for(self) -> float:
+        """Zero seconds."""
+        return 0.0
+
+    def freeze(self) -> None:
+        """Leave the objects of the kernel to the collector: they are not WebMap's."""
+
+
+class View:
+    """The socket of one view's page; in the model's thread."""
+
+    def __init__(self, id: str, pages: NotebookPages, path: str, send: Send) -> None:
+        self.heard_at = time.monotonic()
+        self.over = False
+        self._id = id
+        self._published = pages.published
+        self._send = send
+        self._handle = pages.open_scene(path, id, LOOKER, self)
+
+    def receive(self, text: str) -> None:
+        """Pass a message of the page."""
+        self.heard_at = time.monotonic()
+        self._handle.receive(text)
+
+    def offer(self, item: bytes | str) -> None:
+        """Send a frame, with the pictures that it names."""
+        frame = item.encode() if isinstance(item, str) else item
+        pictures = {}
+        for tag in {found.decode() for found in _PICTURE.findall(frame)}:
+            try:
+                file = self._published.image(tag)
+            except NoSuchFile:
+                continue
+            data = base64.b64encode(file.data).decode()
+            pictures[IMAGES + tag] = f"data:{file.media_type};base64,{data}"
+        self._send({"view": self._id, "pictures": pictures}, [frame])
+
+    def end(self, code: int, reason: str) -> None:
+        """Report why the page was closed."""
+        del code
+        self.over = True
+        self._send({"view": self._id, "ended": f"This map has ended: {reason}."}, [])
+
+    def close(self) -> None:
+        """Close the page."""
+        self.over = True
+        self._handle.closed()
+
+
+class Views:
+    """The views of one widget.
+
+    Args:
+        pages: The pages of all widgets.
+        entry: The page that each view shows.
+        send: Sends a message; called in the model's thread.
+
+    """
+
+    def __init__(self, pages: NotebookPages, entry: PageEntry, send: Send) -> None:
+        self._pages = pages
+        self._path = entry.path
+        self._send_now = send
+        self._context = contextvars.Context()
+        """That of the last message. By it ipykernel knows the thread that waits for
+        the answers: without it they would wait for the end of a cell that runs."""
+        self._views: dict[str, View] = {}
+        self._next_look: asyncio.TimerHandle | None = None
+        pages.entries[entry.path] = entry
+
+    def receive(self, message: object) -> None:
+        """Receive a message of the notebook, valid or not; from any thread."""
+        if isinstance(message, Mapping) and runtime.running:
+            runtime.call(self._receive, message.get("view"), message.get("text"))
+
+    def close(self) -> None:
+        """Close all views; from any thread."""
+        if runtime.running:
+            runtime.call(self._close_all)
+
+    def _send(self, content: dict[str, Any], buffers: list[bytes]) -> None:
+        self._context.run(self._send_now, content, buffers)
+
+    def _receive(self, id: object, text: object) -> None:
+        self._context = contextvars.copy_context()
+        if not isinstance(id, str) or len(id) > MOST_ID:
+            return
+        if not isinstance(text, str):
+            self._forget(id)
+            return
+        try:
+            message = read_message(text)
+        except WireError as error:
+            log.warning("a map in a notebook: %s", error)
+            return
+        view = self._views.get(id)
+        if not isinstance(message, ALLOWED):
+            log.warning("a map in a notebook is for looking only: refused %r", message)
+        elif view is not None and not view.over:
+            view.receive(text)
+        elif isinstance(message, PageHello):
+            self._forget(id)
+            self._open(id).receive(text)
+        else:
+            self._send({"view": id, "unknown": True}, [])
+
+    def _open(self, id: str) -> View:
+        if len(self._views) >= MOST_VIEWS:
+            self._forget(min(self._views, key=lambda id: self._views[id].heard_at))
+        view = self._views[id] = View(id, self._pages, self._path, self._send)
+        if self._next_look is None:
+            self._look_later()
+        return view
+
+    def _forget(self, id: str) -> None:
+        view = self._views.pop(id, None)
+        if view is not None:
+            view.close()
+
+    def _look_later(self) -> None:
+        loop = asyncio.get_running_loop()
+        self._next_look = loop.call_later(SILENT_S / 10, self._look)
+
+    def _look(self) -> None:
+        self._next_look = None
+        silent_since = time.monotonic() - SILENT_S
+        for id, view in tuple(self._views.items()):
+            if view.over or view.heard_at < silent_since:
+                self._forget(id)
+        if self._views:
+            self._look_later()
+
+    def _close_all(self) -> None:
+        for id in tuple(self._views):
+            self._forget(id)
+
+
+def _sources(suffix: str) -> dict[str, str]:
+    package = Path(__file__).parents[1]
+    folders = ("notebook", "web", "features/view")
+    paths = (path for folder in folders for path in (package / folder).rglob("*.*"))
+    return {
+        path.relative_to(package).as_posix(): path.read_text("utf-8")
+        for path in sorted(paths)
+        if path.suffix == suffix
+    }
+
+
+def esm() -> str:
+    """Return the ES module with all that it imports."""
+    sources = _sources(".js")
+    # The engine finds pictures there, and not at a server.
+    sources["web/access.js"] = sources.pop("notebook/addresses.js")
+    start = sources[START].replace('"./addresses.js"', '"../web/access.js"')
+    text = served_modules(sources | {START: start}, (START,))[START]
+    return text.partition("//# sourceMappingURL=")[0]
+
+
+def sheet() -> str:
+    """Return the style sheet of the shadow root that contains a map."""
+    sheets = served_sheets(_sources(".css"), shared="")
+    names = ("web/webmap.css", "features/view/view.css", "notebook/widget.css")
+    return "".join(sheets[name] for name in names).replace(":root", ":host")
 
 
 class MapWidget(anywidget.AnyWidget):
@@ -91,13 +317,12 @@ def widget(page: PageFunction, *, height: int = 400, theme: str = "auto") -> Map
     return shown
 
 
+@functools.cache
 def _notebook_pages() -> NotebookPages:
-    global _pages
-    if _pages is None:
-        _pages = NotebookPages()
-        runtime.on_stop(_pages.close)
-        runtime.serve_pages()
-    return _pages
+    pages = NotebookPages()
+    runtime.on_stop(pages.close)
+    runtime.serve_pages()
+    return pages
 
 
 def _folder_of(page: PageFunction) -> Path:

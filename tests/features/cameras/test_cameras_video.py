@@ -7,8 +7,8 @@ import pytest
 
 from equipment.videos import EVERY, packets
 from webmap.base.errors import ProtocolError
-from webmap.features.cameras import video
-from webmap.features.cameras.video import VideoReader, codec_name
+from webmap.features.cameras import video_camera
+from webmap.features.cameras.video_camera import VideoReader, codec_name
 from webmap.features.cameras.video_codecs import (
     MOST_PARAMETERS,
     Bits,
@@ -76,14 +76,14 @@ def test_vp9_begins_with_its_key_picture():
 
 def test_a_viewer_in_the_middle_waits_for_the_next_key_picture(read):
     assert read(*H264[3:8]) == []
-    assert read.reader.note == video.WAITS
+    assert read.reader.note == video_camera.WAITS
     assert read(*H264[8:]) == list(range(8))
     assert read.reader.note == ""
 
 
 def test_after_a_lost_message_nothing_is_shown_until_the_next_key_picture(read):
     assert read(*H264[:3], *H264[4:8]) == [0, 1, 2]
-    assert read.reader.note == video.LOST
+    assert read.reader.note == video_camera.LOST
     assert read(*H264[8:]) == list(range(8))
     assert read.reader.note == ""
 
@@ -97,7 +97,7 @@ def test_after_a_new_connection_the_reader_waits_for_a_key_picture(read):
 def test_a_video_without_key_pictures_is_a_problem_after_some_seconds(read):
     with pytest.raises(ProtocolError, match=r"no key picture .* for 5 s.*gop_size"):
         read(*H264[1:8] * 20)
-    assert read.now == pytest.approx(video.PATIENCE, abs=0.5)
+    assert read.now == pytest.approx(video_camera.PATIENCE, abs=0.5)
     assert read(*H264[8:]) == list(range(8))
 
 
@@ -174,7 +174,7 @@ def test_a_part_of_a_picture_is_refused(read):
         ((START + b"\x09") * 600, "more than 512 NAL units"),
         (START + b"\x68\xff" + b"\xff" * MOST_PARAMETERS, "bytes of parameters"),
         (START + b"\x62\xff", "data partitions"),
-        (bytes(video.MOST_BYTES + 1), "lower the bit rate"),
+        (bytes(video_camera.MOST_BYTES + 1), "lower the bit rate"),
     ],
 )
 def test_a_broken_packet_is_refused_and_the_video_goes_on_with_a_key_picture(
@@ -187,7 +187,7 @@ def test_a_broken_packet_is_refused_and_the_video_goes_on_with_a_key_picture(
 
 
 def test_a_picture_of_too_many_pixels_is_refused(read, monkeypatch):
-    monkeypatch.setattr(video, "MAX_PIXELS", 160 * 120)
+    monkeypatch.setattr(video_camera, "MAX_PIXELS", 160 * 120)
     with pytest.raises(ProtocolError, match="a video of 160 x 128, 19200 pixels"):
         read(H264[0])
 

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from webmap.features.check import check_store
+from webmap.features.check import check_panel
 from webmap.features.check.check import (
     ARRIVES,
     CONFIRMS,
@@ -14,7 +14,12 @@ from webmap.features.check.check import (
     lines,
     passes,
 )
-from webmap.features.check.check_panel import is_due
+from webmap.features.check.check_panel import (
+    is_due,
+    keep_result,
+    last_result,
+    write_result,
+)
 from webmap.gate.protocol import CheckReport, StopReport
 
 
@@ -153,7 +158,7 @@ def test_a_check_is_due_only_where_one_is_demanded(monkeypatch):
 @pytest.fixture
 def robot(tmp_path, monkeypatch):
     monkeypatch.setenv("WEBMAP_STATE_DIR", str(tmp_path))
-    monkeypatch.setattr(check_store, "_known", {})
+    monkeypatch.setattr(check_panel, "_known", {})
     bridge = SimpleNamespace(url="ws://user:secret@robot:9090")
     source = SimpleNamespace(bridge=bridge)
     return SimpleNamespace(name="Bob", id="r1", pose_source=source)
@@ -162,15 +167,15 @@ def robot(tmp_path, monkeypatch):
 def test_the_last_check_is_kept_with_the_person_and_its_lines(
     robot, tmp_path, monkeypatch
 ):
-    assert check_store.last_of(robot) is None
+    assert last_result(robot) is None
     check = Check(1.0)
     check.look(facts(stop=stopped(), lag=0.9), 2.0)
     check.look(facts(), 3.0)
-    result = check_store.keep(robot, check, "Ann (desk 4)")
-    assert check_store.last_of(robot) == result
-    check_store.write(robot, result)
-    monkeypatch.setattr(check_store, "_known", {})
-    again = check_store.last_of(robot)
+    result = keep_result(robot, check, "Ann (desk 4)")
+    assert last_result(robot) == result
+    write_result(robot, result)
+    monkeypatch.setattr(check_panel, "_known", {})
+    again = last_result(robot)
     assert again == result
     assert (again.by, again.passed, again.lines[0].level) == (
         "Ann (desk 4)",
@@ -184,13 +189,13 @@ def test_the_last_check_is_kept_with_the_person_and_its_lines(
 
 @pytest.mark.parametrize("content", [b"", b"{}", b'{"robot": 1}', b"[" * 10000])
 def test_a_file_of_a_check_that_cannot_be_read_is_no_check(robot, content):
-    file = check_store._file_of(robot)
+    file = check_panel._file_of(robot)
     file.parent.mkdir(parents=True)
     file.write_bytes(content)
-    assert check_store.last_of(robot) is None
+    assert last_result(robot) is None
 
 
 def test_a_check_that_cannot_be_written_is_logged(robot, tmp_path, caplog):
     (tmp_path / "checks").write_text("a file")
-    check_store.write(robot, check_store.keep(robot, Check(1.0), "Ann"))
+    write_result(robot, keep_result(robot, Check(1.0), "Ann"))
     assert "the check of Bob is not kept" in caplog.text

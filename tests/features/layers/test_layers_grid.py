@@ -10,7 +10,7 @@ from module_fakes import header, image_of, images, pixel, pose, typed
 from equipment.waiting import until
 from webmap import Map
 from webmap.base.geometry import Affine
-from webmap.core.layer import Layer
+from webmap.core.map import Layer
 from webmap.core.pictures import pictures
 from webmap.features.layers import grid_tiles as room
 from webmap.server.files import Published

@@ -8,7 +8,7 @@ from module_fakes import image_of, images, matrix_of, pixel, pose, typed
 from test_layers_grid import CLEAR, drawn, grid, update
 
 from webmap.base.geometry import Affine
-from webmap.core.layer import Layer
+from webmap.core.map import Layer
 from webmap.core.pictures import pictures
 from webmap.features.layers import grid_tiles as room
 from webmap.features.layers.grid_picture import grid_png

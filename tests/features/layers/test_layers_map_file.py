@@ -17,7 +17,7 @@ from equipment.waiting import until
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Affine
 from webmap.base.map_file import read_map
-from webmap.core.layer import Layer
+from webmap.core.map import Layer
 from webmap.sim.maps import load_map
 
 pytestmark = pytest.mark.slow

@@ -17,7 +17,7 @@ from test_layers_ways import path
 
 from webmap import Bridge
 from webmap.base.errors import ConfigError, ProtocolError
-from webmap.core.layer import Layer
+from webmap.core.map import Layer
 from webmap.features.layers.diagnostics import DiagnosticArrayMsg
 from webmap.features.layers.grid_cells import GridCellsMsg
 from webmap.features.layers.laser_scanner import SweepMsg

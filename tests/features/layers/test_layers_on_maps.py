@@ -5,7 +5,7 @@ from module_fakes import header, images, pose
 
 from webmap import Map, Robot
 from webmap.base.errors import ConfigError, ModuleNotFound
-from webmap.core.layer import Layer
+from webmap.core.map import Layer
 from webmap.modules.map_layer import ShownLayer
 
 

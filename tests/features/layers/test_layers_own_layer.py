@@ -16,7 +16,7 @@ from webmap import Bridge, Map
 from webmap.base.errors import ConfigError
 from webmap.config.robot import RobotConfig
 from webmap.console import Console
-from webmap.core.layer import Layer
+from webmap.core.map import Layer
 from webmap.core.registry import map_modules, robot_modules
 from webmap.discovery import discover
 from webmap.discovery.findings import FoundLayer

@@ -3,7 +3,7 @@
 import pytest
 
 from webmap.core.shift_files import Entry
-from webmap.features.shift_log.shift_summary import (
+from webmap.features.shift_log.hand_over import (
     driving_of,
     running,
     stops_of,

@@ -3,19 +3,16 @@
 import asyncio
 import logging
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING
 
 import msgspec
 
 from webmap.base.errors import ConfigError
 from webmap.base.lifecycle import lifecycle
 from webmap.base.plain_files import read_file, write_file
+from webmap.core.robot import Robot
 from webmap.core.shift_log import RobotName, shift_log
 from webmap.features.alerts.alerts import PERIOD, Alert, Alerts
 from webmap.gate.locks import state_folder
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
 
 log = logging.getLogger("webmap.modules.alerts")
 
@@ -33,7 +30,7 @@ class AlertKeeper:
     """
 
     def __init__(
-        self, alerts: Alerts, robots: "Callable[[], Iterable[Robot]]", name: str
+        self, alerts: Alerts, robots: Callable[[], Iterable[Robot]], name: str
     ) -> None:
         self._alerts = alerts
         self._robots = robots

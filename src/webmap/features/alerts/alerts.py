@@ -7,19 +7,17 @@ import secrets
 import time
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from webmap.base.audience import RARELY, audience
 from webmap.base.lifecycle import lifecycle
 from webmap.base.roles import Role
+from webmap.core.map import Map
 from webmap.core.operators import Operator
 from webmap.core.problems import cut, without_numbers
+from webmap.core.robot import Robot
 from webmap.gate.protocol import MAY_MOVE
 from webmap.poses.silence import PERIODS
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
-    from webmap.core.robot import Robot
 
 log = logging.getLogger("webmap.modules.alerts")
 
@@ -208,7 +206,7 @@ LOST = 3.0
 """Seconds without a pose or a connection after which a robot is lost."""
 
 
-def conditions(robot: "Robot") -> dict[str, str]:
+def conditions(robot: Robot) -> dict[str, str]:
     """Return what is wrong with a robot now: a text for each kind of alert.
 
     Nothing is wrong with a robot of a recording.
@@ -235,7 +233,7 @@ def conditions(robot: "Robot") -> dict[str, str]:
     return found
 
 
-def _reported(robot: "Robot") -> dict[str, str]:
+def _reported(robot: Robot) -> dict[str, str]:
     report = robot.report
     if report is None:
         return {}
@@ -256,7 +254,7 @@ def _reported(robot: "Robot") -> dict[str, str]:
     return found
 
 
-def without_bridge(robots: "Iterable[Robot]") -> "list[list[Robot]]":
+def without_bridge(robots: Iterable[Robot]) -> list[list[Robot]]:
     """Return the robots of each lost bridge that has several.
 
     The fault is one of the bridge: it is one alert and not one for each robot.
@@ -280,7 +278,7 @@ class AlertWatch:
     def __init__(
         self,
         alerts: Alerts,
-        robots: "Callable[[], Iterable[Robot]]",
+        robots: Callable[[], Iterable[Robot]],
     ) -> None:
         self.alerts = alerts
         self._robots = robots
@@ -360,7 +358,7 @@ class AlertPanel:
         "select": "viewer",
     }
 
-    def __init__(self, map: "Map", alerts: Alerts) -> None:
+    def __init__(self, map: Map, alerts: Alerts) -> None:
         self.map = map
         self._alerts = alerts
         self._sent = -1

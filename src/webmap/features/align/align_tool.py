@@ -3,14 +3,16 @@
 import asyncio
 import logging
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Pose
 from webmap.base.roles import Role
 from webmap.base.tasks import spawn
 from webmap.core.alignment_store import name_of, store
+from webmap.core.map import Map
 from webmap.core.registry import map_modules
+from webmap.core.robot import Robot
 from webmap.poses.alignment import (
     align_bridge,
     alignment,
@@ -18,10 +20,6 @@ from webmap.poses.alignment import (
     numbers,
     toml_line,
 )
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
-    from webmap.core.robot import Robot
 
 log = logging.getLogger("webmap.modules.align_tool")
 
@@ -43,7 +41,7 @@ class AlignTool:
 
     MAY_SEND: ClassVar[Mapping[str, Role]] = {"begin": "admin", "save": "admin"}
 
-    def __init__(self, map: "Map") -> None:
+    def __init__(self, map: Map) -> None:
         self.map = map
         for robot in map.robots:
             store.restore(robot)
@@ -51,7 +49,7 @@ class AlignTool:
             self, "features/align/align_tool.js", {}, "features/align/align_tool.css"
         )
 
-    def on_add_robot(self, robot: "Robot") -> None:
+    def on_add_robot(self, robot: Robot) -> None:
         """Apply the saved alignment of a robot."""
         store.restore(robot)
 
@@ -125,7 +123,7 @@ class AlignTool:
             lost = ""
         self.browser_part.send({"saved": {"line": toml_line(pose), "lost": lost}})
 
-    def _why_refused(self, robot: "Robot | None", *, whole: bool = False) -> str | None:
+    def _why_refused(self, robot: Robot | None, *, whole: bool = False) -> str | None:
         """Return why a robot cannot be aligned from this page now, None if it can."""
         if self.map.page.viewer.role not in MAY_ALIGN:
             return "Only admins can align maps."
@@ -146,7 +144,7 @@ class AlignTool:
                 return f"{each.name} is being driven. Align it when it is free."
         return None
 
-    def _together(self, robot: "Robot") -> "list[Robot]":
+    def _together(self, robot: Robot) -> list[Robot]:
         """Return the robots that are aligned with a robot's bridge, itself included."""
         bridge = robot.pose_source.bridge
         return [

@@ -4,7 +4,7 @@ import asyncio
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from webmap.base.errors import ConfigError, WebMapError
 from webmap.base.scope import Removable, Removal, Scope, keep
@@ -12,6 +12,7 @@ from webmap.base.tasks import spawn
 from webmap.config.buttons import read_buttons
 from webmap.core.base_page import page_of
 from webmap.core.registry import robot_modules
+from webmap.core.robot import Robot
 from webmap.features.buttons.robot_button import RobotButton, declared_motion, values_of
 from webmap.ros.bridge import Bridge
 from webmap.ros.definitions import FLOATS, INTEGERS, TIMES, Field, UnknownType
@@ -19,9 +20,6 @@ from webmap.ros.message_check import Misfit
 from webmap.ros.message_forms import entry_of, filled_in, hint, initial, leaves
 from webmap.scene import html
 from webmap.scene.element import Element, Event
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
 
 MIN_QUESTION_TIME = 0.3
 """Seconds before the answer to a question counts, against double clicks."""
@@ -331,7 +329,7 @@ class Buttons:
     """
 
     def __init__(
-        self, robot: "Robot", bridge: Bridge, buttons: Iterable[Mapping[str, Any]]
+        self, robot: Robot, bridge: Bridge, buttons: Iterable[Mapping[str, Any]]
     ) -> None:
         self.robot = robot
         specs = read_buttons(buttons)

@@ -4,21 +4,19 @@ import json
 import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from webmap.base.errors import MotionRefused, ServiceError, WebMapError
 from webmap.base.scope import Removable, Removal, keep
 from webmap.config.buttons import ButtonConfig, motion_of, value_kind
 from webmap.core.motion import robot_motions
 from webmap.core.operators import Operator
+from webmap.core.robot import Robot
 from webmap.core.shift_log import shift_log
 from webmap.ros.bridge import Bridge
 from webmap.ros.definitions import Field
 from webmap.ros.message_forms import checked, fields_of
 from webmap.ros.names import same_type
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
 
 log = logging.getLogger("webmap.buttons")
 
@@ -40,7 +38,7 @@ class RobotButton:
         spec: The action.
     """
 
-    def __init__(self, robot: "Robot", bridge: Bridge, spec: ButtonConfig) -> None:
+    def __init__(self, robot: Robot, bridge: Bridge, spec: ButtonConfig) -> None:
         self.robot = robot
         self.spec = spec
         self.state: State = "idle"

@@ -6,7 +6,7 @@ import re
 import time
 from collections import deque
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 import msgspec
 
@@ -18,14 +18,12 @@ from webmap.base.tasks import spawn
 from webmap.core.pictures import pictures
 from webmap.core.problems import draw_or_report
 from webmap.core.registry import robot_modules
+from webmap.core.robot import Robot
 from webmap.ros.bridge import Bridge
 from webmap.ros.image_address import parse_address
 from webmap.ros.image_pull import Pull
 from webmap.ros.messages_image import AnyImageMsg, CompressedImageMsg, ImageMsg
 from webmap.ros.names import PICTURES, is_agent_url, split_type
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
 
 AGE_LIMIT = 1.0
 """Seconds after which a picture is stale."""
@@ -52,7 +50,7 @@ class CameraFeed:
         name: The camera's name, for people.
     """
 
-    def __init__(self, robot: "Robot", name: str) -> None:
+    def __init__(self, robot: Robot, name: str) -> None:
         self.robot = robot
         self.name = name
         self.url: str | None = None
@@ -154,7 +152,7 @@ class TopicCamera(CameraFeed):
         name: The camera's name, for people.
     """
 
-    def __init__(self, robot: "Robot", bridge: Bridge, topic: str, name: str) -> None:
+    def __init__(self, robot: Robot, bridge: Bridge, topic: str, name: str) -> None:
         super().__init__(robot, name)
         self.topic = topic
         self._bridge = bridge
@@ -259,7 +257,7 @@ class Camera(TopicCamera):
 
     def __init__(
         self,
-        robot: "Robot",
+        robot: Robot,
         bridge: Bridge,
         topic: str,
         name: str = "Camera",
@@ -367,7 +365,7 @@ class HttpCamera(CameraFeed):
 
     def __init__(
         self,
-        robot: "Robot",
+        robot: Robot,
         address: str,
         name: str = "Camera",
         throttle: int = 200,

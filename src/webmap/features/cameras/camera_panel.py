@@ -7,18 +7,15 @@ import time
 import weakref
 from collections.abc import Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
-from webmap import html
+from webmap import Element, Map, Robot, html
 from webmap.base.roles import Role
 from webmap.features.cameras.camera import AGE_LIMIT
 
-if TYPE_CHECKING:
-    from webmap import Element, Map, Robot
-
 # A page that was open before a restart must not get pictures of another camera.
 _numbers = itertools.count(secrets.randbelow(1 << 40))
-_number_of: "weakref.WeakKeyDictionary[Any, int]" = weakref.WeakKeyDictionary()
+_number_of: weakref.WeakKeyDictionary[Any, int] = weakref.WeakKeyDictionary()
 
 
 class CameraViews:
@@ -29,7 +26,7 @@ class CameraViews:
         self._robot: Robot | None = None
         self._views: list[CameraPicture] = []
 
-    def show(self, robot: "Robot | None") -> None:
+    def show(self, robot: Robot | None) -> None:
         """Show the cameras of a robot in place of those of the last one."""
         self._robot = robot
         for view in self._views:
@@ -107,7 +104,7 @@ class CameraPanel:
         "select": "viewer",
     }
 
-    def __init__(self, map: "Map") -> None:
+    def __init__(self, map: Map) -> None:
         self.map = map
         self._wall = False
         self._cameras: dict[int, Any] = {}
@@ -189,7 +186,7 @@ class CameraPanel:
             self.browser_part.send({"op": "picture", **about, **picture})
 
 
-def _listed(robot: "Robot | None") -> dict[str, Any]:
+def _listed(robot: Robot | None) -> dict[str, Any]:
     return {
         "robot": "" if robot is None else robot.id,
         "name": "" if robot is None else robot.name,
@@ -200,7 +197,7 @@ def _listed(robot: "Robot | None") -> dict[str, Any]:
     }
 
 
-def cameras_of(robot: "Robot | None") -> list[Any]:
+def cameras_of(robot: Robot | None) -> list[Any]:
     """Return the robot's modules that are cameras; none without a robot."""
     modules = [] if robot is None else robot.modules
     return [m for m in modules if hasattr(m, "watch") and hasattr(m, "url")]

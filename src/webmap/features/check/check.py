@@ -1,12 +1,11 @@
 """The steps of a check before driving, and what it finds; no I/O and no clock."""
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import msgspec
 
-if TYPE_CHECKING:
-    from webmap.gate.protocol import RobotReport
+from webmap.gate.protocol import RobotReport
 
 LONGEST = 120.0
 """Seconds after which a check that is not finished has failed."""
@@ -42,7 +41,7 @@ class Line(msgspec.Struct, frozen=True):
 class Facts:
     """What is known of a robot now."""
 
-    report: "RobotReport"
+    report: RobotReport
     lag: float
     """Seconds by which the data of its bridge is late."""
     has_odometry: bool

@@ -1,28 +1,53 @@
 """The check before driving on the card: one button, and each result on a line."""
 
 import asyncio
+import hashlib
+import logging
 import time
 from collections.abc import Callable
 from datetime import datetime
-from typing import TYPE_CHECKING
+from pathlib import Path
 
+import msgspec
+
+from webmap.base.errors import ConfigError
+from webmap.base.plain_files import read_file, write_file
 from webmap.base.tasks import spawn
+from webmap.core.alignment_store import name_of
+from webmap.core.map import Map
+from webmap.core.robot import Robot
 from webmap.core.shift_log import shift_log
-from webmap.features.check import check_store
 from webmap.features.check.check import Check, Facts, Line
+from webmap.gate.locks import state_folder
+from webmap.gate.protocol import RobotReport
 from webmap.scene import html
+from webmap.scene.element import Element
 
-if TYPE_CHECKING:
-    from webmap.core.map import Map
-    from webmap.core.robot import Robot
-    from webmap.gate.protocol import RobotReport
-    from webmap.scene.element import Element
+log = logging.getLogger("webmap.check")
+
+LARGEST = 1 << 16
+"""Most bytes of a file."""
 
 STANDS = ("free", "held", "barred", "barred_held", "stopped", "unconfirmed", "down")
 """The activities of a robot that a STOP does not interrupt."""
 
-Entry = Callable[[str, str, str, str], "Element"]
+Entry = Callable[[str, str, str, str], Element]
 """Returns a line of a list: its level, its name, its text and its advice."""
+
+
+class Result(msgspec.Struct, frozen=True):
+    """A check that is over."""
+
+    robot: str
+    at: float
+    """When, in seconds since 1970."""
+    by: str
+    passed: bool
+    lines: list[Line]
+    why: str = ""
+
+
+_known: dict[str, Result | None] = {}
 
 
 class CheckPanel:
@@ -40,7 +65,7 @@ class CheckPanel:
     """
 
     def __init__(
-        self, map: "Map", urgent: "Element", folded: "Element", entry: Entry
+        self, map: Map, urgent: Element, folded: Element, entry: Entry
     ) -> None:
         self.map = map
         self._entry = entry
@@ -95,18 +120,18 @@ class CheckPanel:
         if robot is not None and report is not None and drivable:
             self._show(robot, report)
 
-    def _go_on(self, robot: "Robot", report: "RobotReport", check: Check) -> None:
+    def _go_on(self, robot: Robot, report: RobotReport, check: Check) -> None:
         over = check.is_over
         if check.look(facts_of(robot, report), time.monotonic()):
             self.browser_part.send({"op": "check", "robot": robot.id})
         if check.is_over and not over:
             person = self.map.page.viewer.operator
             shift_log.note("check", status_of(check), robot=robot, person=person)
-            result = check_store.keep(robot, check, person.logged)
-            spawn(asyncio.to_thread(check_store.write, robot, result))
+            result = keep_result(robot, check, person.logged)
+            spawn(asyncio.to_thread(write_result, robot, result))
 
-    def _show(self, robot: "Robot", report: "RobotReport") -> None:
-        check, last = self._checks.get(robot.id), check_store.last_of(robot)
+    def _show(self, robot: Robot, report: RobotReport) -> None:
+        check, last = self._checks.get(robot.id), last_result(robot)
         due = is_due(report)
         why = self._why_not(robot, report, check)
         place = self._places[0 if due or check is not None else 1]
@@ -130,12 +155,10 @@ class CheckPanel:
             self._list.append(*map(self._line, found))
             self._list.set(hidden=not found)
 
-    def _line(self, line: Line) -> "Element":
+    def _line(self, line: Line) -> Element:
         return self._entry(line.level, f"{line.name}: ", line.text, line.advice)
 
-    def _why_not(
-        self, robot: "Robot", report: "RobotReport", check: Check | None
-    ) -> str:
+    def _why_not(self, robot: Robot, report: RobotReport, check: Check | None) -> str:
         """Return why a check cannot begin now, as a sentence; empty if it can."""
         if not self.map.page.viewer.may_drive(robot.id):
             return "Only operators of this robot can check it."
@@ -166,7 +189,7 @@ class CheckPanel:
         self.poll()
 
 
-def facts_of(robot: "Robot", report: "RobotReport") -> Facts:
+def facts_of(robot: Robot, report: RobotReport) -> Facts:
     """Return what is known of a robot now."""
     bridge = robot.pose_source.bridge
     now = time.monotonic()
@@ -184,7 +207,7 @@ def facts_of(robot: "Robot", report: "RobotReport") -> Facts:
     )
 
 
-def is_due(report: "RobotReport") -> bool:
+def is_due(report: RobotReport) -> bool:
     """Return whether a check is demanded and there is none that is recent enough."""
     check = report.check
     if check is None or check.every is None:
@@ -201,9 +224,7 @@ def status_of(check: Check) -> str:
     return f"The check has failed{': ' if check.why else ''}{check.why}."
 
 
-def last_check(
-    report: "RobotReport", last: "check_store.Result | None", due: bool
-) -> str:
+def last_check(report: RobotReport, last: Result | None, due: bool) -> str:
     """Return when the robot was checked last, and by whom, as sentences."""
     parts = []
     if due:
@@ -219,3 +240,48 @@ def last_check(
 def when(at: float) -> str:
     """Return a day and a time, for people; ``at`` is in seconds since 1970."""
     return f"{datetime.fromtimestamp(at).astimezone():%d %b, %H:%M}"
+
+
+def last_result(robot: Robot) -> Result | None:
+    """Return the last check of a robot; its file is read once."""
+    file = _file_of(robot)
+    if file.name not in _known:
+        _known[file.name] = _read(file)
+    return _known[file.name]
+
+
+def keep_result(robot: Robot, check: Check, by: str) -> Result:
+    """Remember a check that is over, and return its result for the file."""
+    result = Result(robot.name, time.time(), by, check.passed, check.lines, check.why)
+    _known[_file_of(robot).name] = result
+    # The place where the shift log notes a check, with the person and the lines.
+    passed = "passed" if check.passed else "failed"
+    log.info("%s: the check before driving by %s has %s", robot.name, by, passed)
+    return result
+
+
+def write_result(robot: Robot, result: Result) -> None:
+    """Write a result to the disk; may take long, and logs an error."""
+    file = _file_of(robot)
+    try:
+        write_file(file, msgspec.json.encode(result))
+    except OSError as error:
+        log.error("%s: the check of %s is not kept: %s", file, robot.name, error)
+
+
+def _file_of(robot: Robot) -> Path:
+    bridge = robot.pose_source.bridge
+    name = robot.id if bridge is None else name_of(bridge, robot.name)
+    digest = hashlib.sha256(name.encode()).hexdigest()[:24]
+    return state_folder() / "checks" / f"{digest}.json"
+
+
+def _read(file: Path) -> Result | None:
+    try:
+        data = read_file(file, LARGEST, links=False)
+        return msgspec.json.decode(data, type=Result)
+    except FileNotFoundError:
+        return None
+    except (OSError, ConfigError, msgspec.DecodeError, RecursionError) as error:
+        log.warning("%s cannot be read (%s): no check is shown", file, error)
+        return None

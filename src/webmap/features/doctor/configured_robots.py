@@ -2,13 +2,11 @@
 
 import inspect
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
+from webmap import Bridge, Robot
 from webmap.discovery.doctor import ConfiguredRobot
 from webmap.discovery.findings import ACTIONS, TopicRole
-
-if TYPE_CHECKING:
-    from webmap import Bridge, Robot
 
 ROLES: Mapping[str, TopicRole] = {
     "Battery": "battery",
@@ -28,7 +26,7 @@ Topics: TypeAlias = dict[TopicRole, tuple[tuple[str, str], ...]]
 
 
 def configured_robots(
-    robots: "Iterable[Robot]", bridge: "Bridge", maps: Iterable[ModuleArguments] = ()
+    robots: Iterable[Robot], bridge: Bridge, maps: Iterable[ModuleArguments] = ()
 ) -> list[ConfiguredRobot]:
     """Return the robots that use a bridge, with the topics that they use on it.
 
@@ -43,7 +41,7 @@ def configured_robots(
 
 
 def _configured_robot(
-    robot: "Robot", bridge: "Bridge", maps: Iterable[ModuleArguments]
+    robot: Robot, bridge: Bridge, maps: Iterable[ModuleArguments]
 ) -> ConfiguredRobot | None:
     feed, motion = robot.feed, robot.motion
     twist, goals = motion.config.twist, motion.config.move
@@ -78,7 +76,7 @@ def _configured_robot(
 
 
 def _drawn_topics(
-    robot: "Robot", bridge: "Bridge", maps: Iterable[ModuleArguments]
+    robot: Robot, bridge: Bridge, maps: Iterable[ModuleArguments]
 ) -> Topics:
     """Return the topics drawn for a robot, including the maps that show it."""
     roles: tuple[TopicRole, ...] = (*ROLES.values(), *GRIDS)
@@ -104,8 +102,8 @@ def _drawn_topics(
 
 
 def _grid(
-    robot: "Robot",
-    bridge: "Bridge",
+    robot: Robot,
+    bridge: Bridge,
     name: str,
     args: tuple[Any, ...],
     options: dict[str, Any],

@@ -2,13 +2,11 @@
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from webmap.base.roles import Role
+from webmap.core.map import Map
 from webmap.core.registry import map_modules
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
 
 
 @map_modules.register
@@ -35,7 +33,7 @@ class Teleop:
 
     def __init__(
         self,
-        map: "Map",
+        map: Map,
         speed: float,
         rotation_speed: float,
         *,

@@ -1,14 +1,12 @@
 """Saves the visible map as a picture."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from webmap.base.roles import Role
 from webmap.base.text import counted
+from webmap.core.map import Map
 from webmap.core.registry import map_modules
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
 
 MAX_TEXT = 200
 
@@ -29,7 +27,7 @@ class ExportTool:
 
     MAY_SEND: ClassVar[Mapping[str, Role]] = {"failed": "viewer", "missing": "viewer"}
 
-    def __init__(self, map: "Map", *, place: str = "", classes: str = "") -> None:
+    def __init__(self, map: Map, *, place: str = "", classes: str = "") -> None:
         self.map = map
         self.browser_part = map.add_browser_part(
             self,

@@ -2,15 +2,12 @@
 
 import logging
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from webmap.base.roles import Role
-from webmap.core.map import place_of, robot_and_pose
+from webmap.core.map import Map, place_of, robot_and_pose
 from webmap.core.registry import map_modules
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
-    from webmap.core.robot import Robot
+from webmap.core.robot import Robot
 
 log = logging.getLogger("webmap.modules.goal_tool")
 _pose_log = logging.getLogger("webmap.modules.initial_pose")
@@ -24,7 +21,7 @@ FREE, OCCUPIED = 25, 65
 between them and below zero it is unknown."""
 
 
-def ground_at(map: "Map", x: float, y: float) -> str | None:
+def ground_at(map: Map, x: float, y: float) -> str | None:
     """Return what the maps have at a place: ``"free"``, ``"unknown"`` or ``"wall"``.
 
     A wall of one map counts, whatever the others have there.
@@ -84,7 +81,7 @@ class GoalTool:
 
     def __init__(
         self,
-        map: "Map",
+        map: Map,
         *,
         button: bool = True,
         key: str = "g",
@@ -109,7 +106,7 @@ class GoalTool:
         """Make the operator's next press on the map the goal."""
         self.browser_part.send({"active": True})
 
-    def forget(self, robot: "Robot") -> None:
+    def forget(self, robot: Robot) -> None:
         """Remove the arrow of a goal that was reached or is not driven to."""
         self.browser_part.send({"reached": robot.id})
 
@@ -163,7 +160,7 @@ class InitialPoseTool:
         "pose": "operator",
     }
 
-    def __init__(self, map: "Map", *, button: bool = True, key: str = "i") -> None:
+    def __init__(self, map: Map, *, button: bool = True, key: str = "i") -> None:
         if len(key) != 1:
             raise ValueError(f"InitialPoseTool: key must be one character, got {key!r}")
         self.map = map

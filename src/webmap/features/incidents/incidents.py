@@ -5,18 +5,16 @@ import logging
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from webmap.base.lifecycle import lifecycle
+from webmap.core.map import Map
+from webmap.core.robot import Robot
 from webmap.core.shift_log import shift_log
 from webmap.features.incidents.observer import RobotObserver
 from webmap.features.incidents.writer import IncidentWriter, Kept
 from webmap.scene import html
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
-    from webmap.core.robot import Robot
-    from webmap.scene.element import Element
+from webmap.scene.element import Element
 
 log = logging.getLogger("webmap.incidents")
 
@@ -74,7 +72,7 @@ class Incidents:
     """
 
     def __init__(
-        self, robots: "Callable[[], Iterable[Robot]]", alerts: Any = None
+        self, robots: Callable[[], Iterable[Robot]], alerts: Any = None
     ) -> None:
         self.keeping = Keeping()
         self._robots = robots
@@ -121,7 +119,7 @@ class Incidents:
             self._keep(time.monotonic())
         await asyncio.to_thread(self._writer.finish)
 
-    def keep(self, robot: "Robot", by: str) -> None:
+    def keep(self, robot: Robot, by: str) -> None:
         """Keep the last minutes, because a person asked for it.
 
         Args:
@@ -133,7 +131,7 @@ class Incidents:
         reason = f"asked for by {by}"
         self.keeping.trigger(reason, time.monotonic(), asked=True)
 
-    def note(self, robot: "Robot", kind: Any, text: str) -> None:
+    def note(self, robot: Robot, kind: Any, text: str) -> None:
         """Add an event of a robot to the recording."""
         self._observer_of(robot).note(time.time_ns(), kind, text)
 
@@ -154,7 +152,7 @@ class Incidents:
             self._hand_over(now)
             self._keep(now)
 
-    def _observer_of(self, robot: "Robot") -> RobotObserver:
+    def _observer_of(self, robot: Robot) -> RobotObserver:
         found = self._observers.get(robot.id)
         if found is None or found.robot is not robot:
             found = self._observers[robot.id] = RobotObserver(robot)
@@ -210,7 +208,7 @@ class IncidentButton:
 
     """
 
-    def __init__(self, map: "Map", element: "Element", incidents: Incidents) -> None:
+    def __init__(self, map: Map, element: Element, incidents: Incidents) -> None:
         self.map = map
         self._incidents = incidents
         self._may = map.page.viewer.role != "viewer"

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from webmap.bags.ring import (
     EventRecord,
@@ -16,13 +16,11 @@ from webmap.bags.ring import (
 )
 from webmap.base.geometry import Pose
 from webmap.core.problems import cut
+from webmap.core.robot import Robot
 from webmap.gate.protocol import RobotReport
 from webmap.gate.rules.goals import OVER
+from webmap.ros.messages import LaserScanMsg
 from webmap.ros.tf import Transform, TransformError
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
-    from webmap.ros.messages import LaserScanMsg
 
 POSES = 0.2
 """Seconds between two poses of a robot that moves."""
@@ -96,7 +94,7 @@ def _goal(
 class RobotObserver:
     """Makes the records of one robot; remembers what was recorded last."""
 
-    def __init__(self, robot: "Robot") -> None:
+    def __init__(self, robot: Robot) -> None:
         self.robot = robot
         self.records: list[Record] = []
         """The records that were not taken yet."""
@@ -177,9 +175,7 @@ class RobotObserver:
             return  # of several scanners the first one
 
 
-def scan_record(
-    scanner: Any, scan: "LaserScanMsg", time: int, stamp: int
-) -> ScanRecord:
+def scan_record(scanner: Any, scan: LaserScanMsg, time: int, stamp: int) -> ScanRecord:
     """Return the record of a scan, with every n-th of its rays if there are many."""
     ranges = scan.ranges
     step = max(1, -(-len(ranges) // MOST_RAYS))

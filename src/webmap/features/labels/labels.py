@@ -4,14 +4,13 @@ import asyncio
 import logging
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from webmap.base.errors import ConfigError
 from webmap.base.roles import Role
 from webmap.base.scope import Removal, keep
 from webmap.base.tasks import spawn
-from webmap.core.layer import Layer
-from webmap.core.map import robot_and_pose
+from webmap.core.map import Layer, Map, robot_and_pose
 from webmap.core.registry import map_modules
 from webmap.features.labels.label_store import (
     ICONS,
@@ -27,9 +26,6 @@ from webmap.features.labels.label_store import (
 from webmap.gate.locks import state_folder
 from webmap.scene import svg
 from webmap.scene.element import Element
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
 
 log = logging.getLogger("webmap.modules.labels")
 
@@ -287,7 +283,7 @@ class Labels:
 
     def __init__(
         self,
-        map: "Map",
+        map: Map,
         labels: Iterable[Mapping[str, Any] | Label] = (),
         *,
         file: str | Path | None = None,

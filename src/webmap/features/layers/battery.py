@@ -2,16 +2,13 @@
 
 import math
 import time
-from typing import TYPE_CHECKING
 
 from webmap.base.audience import RARELY
 from webmap.base.scope import Removal, keep
 from webmap.core.registry import robot_modules
+from webmap.core.robot import Robot
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import BatteryStateMsg
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
 
 FULL = 1.2
 """Greatest charge of a full battery; uncalibrated gauges report more than 1."""
@@ -34,7 +31,7 @@ class Battery:
     """
 
     def __init__(
-        self, robot: "Robot", bridge: Bridge, topic: str, throttle: int = 1000
+        self, robot: Robot, bridge: Bridge, topic: str, throttle: int = 1000
     ) -> None:
         self.robot = robot
         self.charge: float | None = None

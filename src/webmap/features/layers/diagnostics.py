@@ -5,7 +5,7 @@ import time
 import weakref
 from collections import Counter
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, TypeAlias
+from typing import Any, ClassVar, Literal, TypeAlias
 
 import msgspec
 
@@ -13,14 +13,12 @@ from webmap.base.errors import ConfigError, ProtocolError
 from webmap.base.scope import Removal, keep
 from webmap.core.problems import draw_or_report
 from webmap.core.registry import robot_modules
+from webmap.core.robot import Robot
 from webmap.modules.declaration import FoundTopic, TopicKind, layer
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import Stamped
 from webmap.scene import html, svg
 from webmap.scene.element import Element
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
 
 Owner: TypeAlias = Literal["own", "another", "unknown"]
 """Owner of a part, for one robot: the robot, another robot, or unknown."""
@@ -61,7 +59,7 @@ class PartOwners:
         if len(self._followers) < 2:
             return "own"
         # The text after the colon is a task, which may contain slashes too.
-        inside = without_slashes(name).partition(":")[0]
+        inside = name.strip("/").partition(":")[0]
         while inside and inside not in self._followers:
             inside = inside.rpartition("/")[0]
         if not inside:
@@ -72,11 +70,6 @@ class PartOwners:
         self._followers[namespace] -= 1
         if not self._followers[namespace]:
             del self._followers[namespace]
-
-
-def without_slashes(name: str) -> str:
-    """Return the name of a part, or a namespace, without outer slashes."""
-    return name.strip("/")
 
 
 def part_owners(bridge: Bridge, topic: str) -> PartOwners:
@@ -223,7 +216,7 @@ class Diagnostics:
 
     def __init__(
         self,
-        robot: "Robot",
+        robot: Robot,
         bridge: Bridge,
         topic: str = "/diagnostics",
         *,
@@ -240,7 +233,7 @@ class Diagnostics:
                 f"{namespace!r} and {prefix!r}"
             )
         self.robot = robot
-        self.namespace = without_slashes(namespace)
+        self.namespace = namespace.strip("/")
         self.prefix = prefix.lstrip("/")
         self.hold = hold
         self._owners = part_owners(bridge, topic)

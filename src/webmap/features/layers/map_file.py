@@ -2,18 +2,14 @@
 
 import asyncio
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from webmap.base.errors import ConfigError
 from webmap.base.map_file import MapImage, cell_at, read_map
 from webmap.base.tasks import spawn
-from webmap.core.layer import Layer
+from webmap.core.map import Layer, Map
 from webmap.core.registry import map_modules
 from webmap.features.layers.grid_picture import Palette, check_palette
 from webmap.features.layers.grid_tiles import GridTiles
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
 
 
 @map_modules.register
@@ -37,7 +33,7 @@ class MapFile:
 
     def __init__(
         self,
-        map: "Map",
+        map: Map,
         file: str | Path,
         *,
         palette: Palette = "map",

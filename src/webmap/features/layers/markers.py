@@ -24,8 +24,7 @@ from webmap.features.layers.marker_drawing import (
 )
 from webmap.modules.declaration import TopicKind, layer
 from webmap.modules.drawing import check_finite, flat, in_space
-from webmap.modules.layer_frames import LayerFrames, not_known
-from webmap.modules.map_layer import MapLayer
+from webmap.modules.map_layer import LayerFrames, MapLayer, not_known
 from webmap.ros.tf import Transform, TransformError
 from webmap.scene import svg
 from webmap.scene.element import Element

@@ -1,15 +1,13 @@
 """Modules of a robot that are added to every map that shows the robot."""
 
 import inspect
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from webmap.base.errors import ModuleNotFound, WebMapError
 from webmap.core.module_arguments import check_arguments
 from webmap.core.registry import map_modules, robot_modules
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
-    from webmap.core.world_view import WorldView
+from webmap.core.robot import Robot
+from webmap.core.world_view import WorldView
 
 
 @robot_modules.register
@@ -33,7 +31,7 @@ class OnMaps:
     """
 
     def __init__(
-        self, robot: "Robot", /, module: str, *args: Any, **options: Any
+        self, robot: Robot, /, module: str, *args: Any, **options: Any
     ) -> None:
         factory = map_modules[module]
         check_arguments(factory, args, options, first=1)
@@ -51,7 +49,7 @@ class OnMaps:
         for map in list(self._modules):
             self.on_map(map, False)
 
-    def on_map(self, map: "WorldView", shown: bool) -> None:
+    def on_map(self, map: WorldView, shown: bool) -> None:
         """Add the module to a map that shows the robot now, or remove it."""
         if not shown:
             module = self._modules.pop(map, None)

@@ -2,16 +2,13 @@
 
 import math
 from collections import deque
-from typing import TYPE_CHECKING
 
 from webmap.base.errors import ConfigError
 from webmap.core.registry import robot_modules
+from webmap.core.robot import Robot
 from webmap.modules.placed import Placed
 from webmap.scene import svg
 from webmap.scene.element import Element
-
-if TYPE_CHECKING:
-    from webmap.core.robot import Robot
 
 SPEED = 2.0
 """Metres per second that a robot may drive between two poses that are requested rarely,
@@ -42,7 +39,7 @@ class Trail:
 
     def __init__(
         self,
-        robot: "Robot",
+        robot: Robot,
         *,
         length: float = 20.0,
         step: float = 0.1,

@@ -7,21 +7,19 @@ import weakref
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from webmap.base.errors import ConfigError
 from webmap.base.roles import Role
 from webmap.base.scope import Removable, Removal, keep, no_scope
+from webmap.core.map import Map
 from webmap.core.problems import draw_or_report
 from webmap.core.registry import map_modules, robot_modules
+from webmap.core.robot import Robot
 from webmap.ros.bridge import Bridge
 from webmap.ros.messages import LOG_LEVELS, LogMsg
 from webmap.scene import html
 from webmap.scene.element import Element
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
-    from webmap.core.robot import Robot
 
 MAX_TEXT = 2000
 """Greatest number of characters that are kept of one line."""
@@ -67,7 +65,7 @@ class Rosout:
 
     def __init__(
         self,
-        robot: "Robot",
+        robot: Robot,
         bridge: Bridge,
         topic: str = "/rosout",
         *,
@@ -223,7 +221,7 @@ class BridgeLog:
             self._subscription = None
 
 
-_logs: "weakref.WeakKeyDictionary[Bridge, BridgeLog]" = weakref.WeakKeyDictionary()
+_logs: weakref.WeakKeyDictionary[Bridge, BridgeLog] = weakref.WeakKeyDictionary()
 
 
 def log_of(bridge: Bridge) -> BridgeLog:
@@ -260,8 +258,8 @@ class RosoutPanel:
 
     def __init__(
         self,
-        map: "Map",
-        bridges: Sequence["Bridge"],
+        map: Map,
+        bridges: Sequence[Bridge],
         *,
         level: str = "info",
         lines: int = 100,

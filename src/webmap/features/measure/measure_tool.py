@@ -1,11 +1,7 @@
 """Measures distances on the map."""
 
-from typing import TYPE_CHECKING
-
+from webmap.core.map import Map
 from webmap.core.registry import map_modules
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
 
 
 @map_modules.register
@@ -24,7 +20,7 @@ class MeasureTool:
         ValueError: If ``key`` is not one character.
     """
 
-    def __init__(self, map: "Map", *, key: str = "m") -> None:
+    def __init__(self, map: Map, *, key: str = "m") -> None:
         if len(key) != 1:
             raise ValueError(f"MeasureTool: key must be one character, got {key!r}")
         self.map = map

@@ -1,7 +1,7 @@
 """The player bar of a recording, and the commands of a page to the replay."""
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar
 from weakref import WeakKeyDictionary
 
 import msgspec
@@ -18,15 +18,13 @@ from webmap.bags.playback import (
 )
 from webmap.base.errors import ConfigError
 from webmap.base.roles import Role
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
-    from webmap.core.robot import Robot
-    from webmap.ros.bridge import Bridge
+from webmap.core.map import Map
+from webmap.core.robot import Robot
+from webmap.ros.bridge import Bridge
 
 T = TypeVar("T")
 
-_newest_marks: "WeakKeyDictionary[Bridge, Marks]" = WeakKeyDictionary()
+_newest_marks: WeakKeyDictionary[Bridge, Marks] = WeakKeyDictionary()
 """The newest marks of each recording, for pages that are opened later: the bridge sends
 marks that were found in several parts to its first listener only."""
 
@@ -49,8 +47,8 @@ class RecordingPlayer:
 
     def __init__(
         self,
-        map: "Map",
-        bridge: "Bridge",
+        map: Map,
+        bridge: Bridge,
         send_command: Callable[[PlaybackCommand], object],
     ) -> None:
         self.map = map
@@ -102,7 +100,7 @@ class RecordingPlayer:
         self.browser_part.send({kind: msgspec.to_builtins(value)})
 
 
-def expect_jumps(bridge: "Bridge", robots: Callable[[], Iterable["Robot"]]) -> None:
+def expect_jumps(bridge: Bridge, robots: Callable[[], Iterable[Robot]]) -> None:
     """Fire ``on_seek()`` on each robot whenever the position of a replay jumps.
 
     Args:

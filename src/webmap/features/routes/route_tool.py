@@ -7,7 +7,7 @@ import re
 import threading
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import msgspec
 
@@ -15,11 +15,9 @@ from webmap.base.errors import ConfigError
 from webmap.base.plain_files import LARGEST_STATE, read_file, write_file
 from webmap.base.roles import Role
 from webmap.base.tasks import spawn
+from webmap.core.map import Map
 from webmap.core.registry import map_modules
 from webmap.gate.locks import state_folder
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
 
 log = logging.getLogger("webmap.modules.route_tool")
 
@@ -189,7 +187,7 @@ class RouteTool:
         "delete": "operator",
     }
 
-    def __init__(self, map: "Map", name: str | None = None) -> None:
+    def __init__(self, map: Map, name: str | None = None) -> None:
         self.map = map
         self._store = RouteStore(
             state_folder() / "routes", name or f"page {map.page.entry.path}"

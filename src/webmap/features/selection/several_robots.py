@@ -2,12 +2,10 @@
 
 import logging
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from webmap.base.roles import Role
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
+from webmap.core.map import Map
 
 log = logging.getLogger("webmap.modules.several_robots")
 
@@ -38,7 +36,7 @@ class SeveralRobots:
 
     def __init__(
         self,
-        map: "Map",
+        map: Map,
         aim_goal: Callable[[], object],
         *,
         rows: str = "",

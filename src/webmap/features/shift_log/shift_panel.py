@@ -2,15 +2,13 @@
 
 import time
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from webmap.base.roles import Role
+from webmap.core.map import Map
 from webmap.core.shift_choice import KINDS, Choice, may_see
 from webmap.core.shift_files import Entry
 from webmap.core.shift_log import RobotName, shift_log
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
 
 MOST_ROWS = 200
 """Entries that the panel lists; the CSV has more."""
@@ -40,7 +38,7 @@ class ShiftPanel:
         "shift": "operator",
     }
 
-    def __init__(self, map: "Map", hand_over: str) -> None:
+    def __init__(self, map: Map, hand_over: str) -> None:
         self.map = map
         self._viewer = map.page.viewer
         self._choice: Choice | None = None

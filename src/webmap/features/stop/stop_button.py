@@ -1,11 +1,7 @@
 """STOP buttons that are always visible."""
 
-from typing import TYPE_CHECKING
-
+from webmap.core.map import Map
 from webmap.core.registry import map_modules
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
 
 
 @map_modules.register
@@ -20,7 +16,7 @@ class StopButton:
             button is over the map.
     """
 
-    def __init__(self, map: "Map", *, place: str = "") -> None:
+    def __init__(self, map: Map, *, place: str = "") -> None:
         self.map = map
         self.browser_part = map.add_browser_part(
             self,

@@ -4,7 +4,7 @@ import asyncio
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from webmap.base.errors import ConfigError
 from webmap.base.geometry import Affine
@@ -13,15 +13,13 @@ from webmap.base.scope import Removal, keep
 from webmap.base.tasks import spawn
 from webmap.config.fleet import TilesConfig
 from webmap.config.reading import read_key
+from webmap.core.map import Map
 from webmap.core.pictures import pictures
 from webmap.core.registry import map_modules
 from webmap.features.tiles.tile_source import Tile, open_tiles
 from webmap.scene import svg
 from webmap.scene.element import Element
 from webmap.scene.node import Fragment
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
 
 ORDER = -1.0
 """Below the images of the map."""
@@ -68,7 +66,7 @@ class TileLayer:
 
     def __init__(
         self,
-        map: "Map",
+        map: Map,
         source: str | Path,
         datum: tuple[float, float],
         *,

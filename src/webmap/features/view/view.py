@@ -1,16 +1,14 @@
 """The view of a map: its control, the robot it follows, and what lies over the map."""
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from webmap.base.errors import ConfigError
 from webmap.base.roles import Role
+from webmap.core.map import Map
 from webmap.core.registry import map_modules
 from webmap.modules.declaration import declarations
 from webmap.scene.element import Element
-
-if TYPE_CHECKING:
-    from webmap.core.map import Map
 
 
 @map_modules.register
@@ -21,7 +19,7 @@ class MouseViewControl:
     click. The module runs in the browser, which owns the view.
     """
 
-    def __init__(self, map: "Map") -> None:
+    def __init__(self, map: Map) -> None:
         self.map = map
         self.browser_part = map.add_browser_part(
             self,
@@ -43,7 +41,7 @@ class Follow:
 
     MAY_SEND: ClassVar[Mapping[str, Role]] = {"follow": "viewer"}
 
-    def __init__(self, map: "Map") -> None:
+    def __init__(self, map: Map) -> None:
         self.map = map
         self.browser_part = map.add_browser_part(
             self, "features/view/follow.js", {}, "features/view/view.css"
@@ -69,7 +67,7 @@ class MetreGrid:
         ValueError: If ``least`` is less than 4.
     """
 
-    def __init__(self, map: "Map", least: int = 32) -> None:
+    def __init__(self, map: Map, least: int = 32) -> None:
         if least < 4:
             raise ValueError(f"MetreGrid: least must be at least 4 pixels, got {least}")
         self.map = map
@@ -93,7 +91,7 @@ class ScaleBar:
         ValueError: If ``width`` is less than 20.
     """
 
-    def __init__(self, map: "Map", width: int = 120) -> None:
+    def __init__(self, map: Map, width: int = 120) -> None:
         if width < 20:
             raise ValueError(f"ScaleBar: width must be at least 20 pixels, got {width}")
         self.map = map
@@ -117,7 +115,7 @@ class PointerReadout:
         ValueError: If ``digits`` is not in 0 to 6.
     """
 
-    def __init__(self, map: "Map", digits: int = 2) -> None:
+    def __init__(self, map: Map, digits: int = 2) -> None:
         if not 0 <= digits <= 6:
             raise ValueError(f"PointerReadout: digits must be 0 to 6, got {digits}")
         self.map = map
@@ -140,7 +138,7 @@ class ShowSelected:
     """
 
     def __init__(
-        self, map: "Map", element: Element, default_msg: str = "No selection"
+        self, map: Map, element: Element, default_msg: str = "No selection"
     ) -> None:
         self.map = map
         self.element = element
@@ -221,7 +219,7 @@ class LayerSwitches:
 
     def __init__(
         self,
-        map: "Map",
+        map: Map,
         layers: Mapping[str, str] | None = None,
         *,
         off: Iterable[str] = (),

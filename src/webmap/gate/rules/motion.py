@@ -223,7 +223,9 @@ class Motion:
         self._left_alone = False
         self._pending: tuple[Twist, Lease, float] | None = None
         self._tried_at = float("-inf")
-        self._sent_at = self._moved_at = float("-inf")
+        self._sent_at = float("-inf")
+        self.moved_at = float("-inf")
+        """When the last velocity other than zero was written."""
         self.sent_epoch: int | None = None
         """The epoch of the last velocity; that of a zero is that of the motion."""
 
@@ -249,7 +251,7 @@ class Motion:
         if not self.driving:
             self._burst.end()
             self.driving = True
-            self._owe_zero()
+            self.owe_zero()
         self._pending = (wanted, lease, now)
         self._flush(now)
 
@@ -257,11 +259,6 @@ class Motion:
         """Write nothing more, not even zero, although it moves (stop test only)."""
         self.driving, self._pending = False, None
         self._left_alone = True
-
-    @property
-    def moved_at(self) -> float:
-        """When the last velocity other than zero was written."""
-        return self._moved_at
 
     def halt(self, now: float) -> None:
         """Write zeros if the machine is driven."""
@@ -277,7 +274,7 @@ class Motion:
 
         """
         self.begin_zeros(now, length)
-        self._owe_zero()  # after the zero: no disk access may delay a stop
+        self.owe_zero()  # after the zero: no disk access may delay a stop
 
     def begin_zeros(self, now: float, length: float | None = None) -> None:
         """Do the first part of :meth:`zero`, which must follow: write zero at once."""
@@ -307,10 +304,6 @@ class Motion:
             self._burst.end()  # its last zeros went to the previous link
             self.zero(now, NEW_LINK_LENGTH)
 
-    def owe_zero(self) -> None:
-        """Note that an earlier gate may have left the machine moving."""
-        self._owe_zero()
-
     def step(self, now: float) -> None:
         """Write the command or the zero that is due."""
         self._flush(now)
@@ -325,9 +318,10 @@ class Motion:
         """Note a velocity that was written."""
         self.sent, self._sent_at, self.sent_epoch = write.twist, now, write.epoch
         if not write.twist.is_zero:
-            self._moved_at = now
+            self.moved_at = now
 
-    def _owe_zero(self) -> None:
+    def owe_zero(self) -> None:
+        """Note that a gate may leave the machine moving: it must get a zero."""
         if not self.owes_zero:
             self.owes_zero = True
             self._emit(MarkDriven(self._key, True))

@@ -70,7 +70,8 @@ class StopLatch:
         self._key = key
         self._emit = emit
         self._number = 0
-        self._saved = True
+        self.settled = True
+        """Whether no save is pending."""
         self._save_next = False
         self._saving: Press | None = None
         self._ids: set[str] = set()
@@ -93,12 +94,12 @@ class StopLatch:
 
     def set(self, press: Press) -> None:
         """Activate STOP, with ``press`` as the newest press."""
-        waiting = self.on and not self._saved
+        waiting = self.on and not self.settled
         self.press = press
         if waiting:  # one write at a time; the next one has the newest press
             self._save_next = True
         else:
-            self._save()
+            self.save()
 
     def found(self, press: Press) -> None:
         """Take over a press that an earlier or another gate saved on disk."""
@@ -111,16 +112,7 @@ class StopLatch:
         if press is None or press == self.press:
             return False
         # A press that is being saved, or could not be saved, is newer than the file.
-        return self._saved and not (self.on and self.trouble)
-
-    @property
-    def settled(self) -> bool:
-        """Whether no save is pending."""
-        return self._saved
-
-    def save_again(self) -> None:
-        """Save the current state again, because the file was removed."""
-        self._save()
+        return self.settled and not (self.on and self.trouble)
 
     def drop(self) -> None:
         """Deactivate STOP here only; another gate is responsible for the file."""
@@ -145,23 +137,24 @@ class StopLatch:
     def reset(self) -> None:
         """End the STOP, also on disk."""
         self.press = self.shown = None
-        self._save()
+        self.save()
         self._ids.clear()
 
     def kept(self, event: StopSaved) -> None:
         """Note the result of a save; only the newest save counts."""
         if event.number != self._number:
             return
-        self._saved, self.trouble = True, event.error
+        self.settled, self.trouble = True, event.error
         self.shown = self._saving
         if self._save_next:
-            self._save()
+            self.save()
         elif self.shown is not None and event.error is None:
             self._ids = {self.shown.id}
 
-    def _save(self) -> None:
+    def save(self) -> None:
+        """Save the current state."""
         self._number += 1
-        self._saved, self.trouble, self._save_next = False, None, False
+        self.settled, self.trouble, self._save_next = False, None, False
         self._saving = self.press
         if self.press is not None:
             self._ids.add(self.press.id)
@@ -338,7 +331,7 @@ class ActiveStop:
             for hooks in self._robots.hooks.values():
                 hooks.drop()
         else:
-            latch.save_again()  # a removed file is no reset
+            latch.save()  # a removed file is no reset
         return False
 
     def take_over(self, press: Press, now: float) -> None:

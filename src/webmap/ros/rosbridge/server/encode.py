@@ -6,17 +6,15 @@ import math
 from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import cbor2
 import msgspec
 
 from webmap.ros.definitions import OCTETS, Field
 from webmap.ros.rosbridge.server.dialect import Quirks
+from webmap.ros.rosbridge.server.schema import Schema
 from webmap.ros.serialized.writer import serialize
-
-if TYPE_CHECKING:
-    from webmap.ros.rosbridge.server.schema import Schema
 
 # RFC 8746: typed arrays, little-endian.
 _ARRAY_TAGS = {
@@ -69,7 +67,7 @@ class Encoder:
     """
 
     def __init__(
-        self, schema: "Schema", quirks: Quirks, max_message_size: int = MAX_MESSAGE_SIZE
+        self, schema: Schema, quirks: Quirks, max_message_size: int = MAX_MESSAGE_SIZE
     ) -> None:
         self.schema = schema
         self.quirks = quirks

@@ -9,10 +9,15 @@ from functools import partial
 from itertools import count
 from typing import Any
 
+from webmap.ros.rosbridge.server.client import (
+    Client,
+    Handlers,
+    Operation,
+    Topics,
+    text,
+)
 from webmap.ros.rosbridge.server.dialect import canonical, resolve
 from webmap.ros.rosbridge.server.graph import GoalHandle, GraphError, Respond
-from webmap.ros.rosbridge.server.operation import Client, Handlers, Operation, text
-from webmap.ros.rosbridge.server.topics import Topics
 
 log = logging.getLogger("webmap.sim")
 
