@@ -587,6 +587,8 @@ class TestTasks:
                 await noting.calls.settle()
                 what = "does not offer /go/_action/cancel_goal"
                 assert what in caplog.text
+                # The bridge has time to offer the service now.
+                monkeypatch.setattr("webmap.gate.lanes.calls.CALL_TIMEOUT", 20.0)
                 noting.lane.cancel(spec(cancel_topic=None, action="/go"))
                 await until(lambda: len(server.clients) == 3, "the call")
                 await server.send({"op": "advertiseServices", "services": [cancel]})
