@@ -73,6 +73,7 @@ ROSBRIDGE_WORDS = re.compile(
 PROTOCOL_ROOMS = (
     "ros/rosbridge/",
     "ros/foxglove/",
+    "ros/rmw_zenoh/",
     "gate/",  # the gate has separate sockets to the rosbridge
     "agents/",  # an agent forwards the requests of displays to its rosbridge
     "testing/",  # the test robots have rosbridges

@@ -368,6 +368,11 @@ def unadvertise(ids: Iterable[int]) -> bytes:
     return _text("unadvertise", channelIds=list(ids))
 
 
+def message_data(subscription: int, time: int, payload: bytes) -> bytes:
+    """Return the frame of a server with a message and its time, in nanoseconds."""
+    return _MESSAGE.pack(MESSAGE_DATA, subscription, time) + payload
+
+
 def message(channel: int, payload: bytes) -> bytes:
     """Return the binary frame with a message on a topic of this client."""
     return _CLIENT_MESSAGE.pack(_CLIENT_MESSAGE_DATA, channel) + payload
