@@ -22,7 +22,7 @@ from webmap.ros.bridge import LINKS
 from webmap.ros.limits import MAX_FRAME
 from webmap.ros.link import LinkCallbacks, ReconnectingLink
 from webmap.ros.names import DEFAULT_PORTS, same_type
-from webmap.ros.rmw_zenoh.graph import ROOT, RmwZenohGraph
+from webmap.ros.rmw_zenoh.graph import MOST_ENDPOINTS, ROOT, RmwZenohGraph
 from webmap.ros.rmw_zenoh.messages import Sample, message_of, refusal_of
 from webmap.ros.sockets.connection import (
     CLOSED_HERE,
@@ -36,7 +36,7 @@ from webmap.ros.subscriptions import Topic
 try:
     import zenoh
     from zenoh import ext
-    from zenoh.handlers import Callback
+    from zenoh.handlers import Callback, FifoChannel
 except ImportError:
     raise ConfigError(
         "zenoh-ros2:// needs Zenoh, which is not installed: pip install 'webmap[fleet]'"
@@ -339,17 +339,10 @@ class RmwZenohLink(ReconnectingLink):
 
     def _tokens(self, session: zenoh.Session) -> list[str]:
         """Return the tokens of the domain; waits for the router."""
-        tokens: list[str] = []
-        over = threading.Event()
-
-        def add(reply: zenoh.Reply) -> None:
-            if reply.ok is not None:
-                tokens.append(str(reply.ok.key_expr))
-
-        # A channel of Zenoh blocks the question itself when more tokens come than fit.
-        handler = Callback(add, over.set, indirect=False)
-        session.liveliness().get(f"{ROOT}/**", handler, timeout=PATIENCE)
-        over.wait(PATIENCE + 1)
+        # A full channel would block the question itself, so every token must fit.
+        channel: FifoChannel[zenoh.Reply] = FifoChannel(10 * MOST_ENDPOINTS)
+        replies = session.liveliness().get(f"{ROOT}/**", channel, timeout=PATIENCE)
+        tokens = [str(each.ok.key_expr) for each in replies if each.ok is not None]
         found = [t for t in tokens if t.startswith(f"{ROOT}/{self._domain}/")]
         if tokens and not found:
             others = sorted({token.split("/")[1] for token in tokens})
