@@ -1,4 +1,4 @@
-"""The connection of a bridge to the Zenoh router of a robot with rmw_zenoh.
+"""The connections of a bridge to the Zenoh router of a robot with rmw_zenoh.
 
 WebMap is a client of the router: it reads the tokens of the nodes and subscribes to
 topics. It publishes nothing, calls no service, and announces no node.
@@ -6,32 +6,33 @@ topics. It publishes nothing, calls no service, and announces no node.
 
 import asyncio
 import atexit
-import json
-import logging
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
-from functools import partial
-from typing import Any, Unpack
+from collections.abc import AsyncIterator, Callable, Iterable
+from contextlib import asynccontextmanager, suppress
+from typing import Any, Literal
 from urllib.parse import urlsplit
+
+import msgspec
 
 from webmap.base.errors import BridgeClosed, BridgeError, ConfigError, ServiceError
 from webmap.base.text import one_line
+from webmap.base.zenoh_sessions import client_settings, why_not_reached, zenoh_config
 from webmap.ros.bridge import LINKS
+from webmap.ros.foxglove.graph import FoxgloveGraph
+from webmap.ros.foxglove.link import FoxgloveLink
 from webmap.ros.limits import MAX_FRAME
-from webmap.ros.link import LinkCallbacks, ReconnectingLink
-from webmap.ros.names import DEFAULT_PORTS, same_type
-from webmap.ros.rmw_zenoh.graph import MOST_ENDPOINTS, ROOT, RmwZenohGraph
-from webmap.ros.rmw_zenoh.messages import Sample, message_of, refusal_of
-from webmap.ros.sockets.connection import (
-    CLOSED_HERE,
-    CONNECT_TIMEOUT,
-    LOOK_PERIOD,
-    BridgeConnection,
-    why_not_reached,
+from webmap.ros.names import DEFAULT_PORTS
+from webmap.ros.rmw_zenoh.offer import (
+    INTRODUCTION,
+    MOST_ENDPOINTS,
+    ROOT,
+    Offer,
+    message_frame,
+    remark,
 )
-from webmap.ros.subscriptions import Topic
+from webmap.ros.sockets.connection import CLOSED_HERE, LOOK_PERIOD, BridgeConnection
 
 try:
     import zenoh
@@ -41,8 +42,6 @@ except ImportError:
     raise ConfigError(
         "zenoh-ros2:// needs Zenoh, which is not installed: pip install 'webmap[fleet]'"
     ) from None
-
-log = logging.getLogger("webmap.ros")
 
 SCHEME = "zenoh-ros2"
 
@@ -55,13 +54,7 @@ MOST_WAITING = 1_000
 MOST_WAITING_BYTES = 8 << 20
 """The same in bytes, besides the newest message."""
 
-MOST_PUBLISHERS = 64
-"""Publishers of one topic among which a readable one is searched."""
-
 LOSSY = "messages come faster than they are read; the oldest were left out"
-
-MOST_COMPLAINTS = 50
-"""Different faults that are reported of one connection."""
 
 
 def domain_of(url: str) -> int:
@@ -80,49 +73,36 @@ def domain_of(url: str) -> int:
     return int(text)
 
 
-async def open_session(url: str) -> zenoh.Session:
-    """Open a session with the router of an address.
+@asynccontextmanager
+async def session_with(url: str) -> AsyncIterator[zenoh.Session]:
+    """Open a session with the router of an address, and close it in the end.
 
     Raises:
         BridgeClosed: If that fails; with the reason.
 
     """
-    parts, port = urlsplit(url), urlsplit(url).port or DEFAULT_PORTS[SCHEME]
-    host = parts.netloc.removesuffix(f":{port}")
-    place = {"endpoints": [f"tcp/{host}:{port}"], "timeout_ms": 0}
-    settings = {
-        "mode": "client",
-        "connect": {**place, "exit_on_failure": True},
-        "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
-        "transport": {
-            "shared_memory": {"enabled": False},
-            "unicast": {"open_timeout": int(CONNECT_TIMEOUT * 1000)},
-            "link": {"rx": {"max_message_size": 4 * MAX_FRAME}},
-        },
-    }
-    config = zenoh.Config.from_json5(json.dumps(settings))
+    parts = urlsplit(url)
+    port = "" if parts.port else f":{DEFAULT_PORTS[SCHEME]}"
+    locator = f"tcp/{parts.netloc}{port}"
+    config = zenoh_config(**client_settings(locator, 4 * MAX_FRAME))
     opening = asyncio.ensure_future(asyncio.to_thread(zenoh.open, config))
     try:
         session = await asyncio.shield(opening)
     except zenoh.ZError:
-        why = await _why_not_opened(parts.hostname, port)
+        why = await asyncio.to_thread(why_not_reached, locator) or (
+            "what listens there is no Zenoh router, or lets nobody in without a user"
+        )
         text = f"cannot reach the Zenoh router at {url}: {why}"
         raise BridgeClosed(text, why) from None
     except asyncio.CancelledError:
         opening.add_done_callback(_close_late)
         raise
     atexit.register(session.close)  # an open one hangs the end of the process
-    return session
-
-
-async def _why_not_opened(host: str | None, port: int) -> str:
     try:
-        async with asyncio.timeout(CONNECT_TIMEOUT):
-            _, writer = await asyncio.open_connection(host, port)
-    except (OSError, UnicodeError) as error:
-        return why_not_reached(error)
-    writer.close()
-    return "what listens there is no Zenoh router, or lets nobody in without a user"
+        yield session
+    finally:
+        atexit.unregister(session.close)
+        await asyncio.shield(asyncio.to_thread(session.close))
 
 
 def _close_late(opening: "asyncio.Future[zenoh.Session]") -> None:
@@ -131,118 +111,207 @@ def _close_late(opening: "asyncio.Future[zenoh.Session]") -> None:
         opening.result().close()  # type: ignore[no-untyped-call]
 
 
-async def close_session(session: zenoh.Session) -> None:
-    """Close a session, also while this task is cancelled."""
-    atexit.unregister(session.close)
-    await asyncio.shield(asyncio.to_thread(session.close))
+class RouterConnection(BridgeConnection):
+    """A session with the router, which offers its topics as a Foxglove server would.
 
+    Args:
+        url: The bridge's address: ``zenoh-ros2://host:port/domain``.
+        options: The other arguments of ``BridgeConnection``.
 
-class _RouterConnection(BridgeConnection):
-    """A session with the router, kept open; its callbacks are those of the base."""
+    Raises:
+        ConfigError: If the address has no valid domain.
 
-    session: zenoh.Session | None = None
+    """
+
+    def __init__(self, url: str, **options: Any) -> None:
+        super().__init__(url, **options)
+        self._domain = domain_of(url)
+        self._session: zenoh.Session | None = None
+        self._offer = Offer()
+        self._readers: dict[int, _Reader] = {}
+        """By the ids of the subscriptions."""
 
     async def _one_link(self) -> float:
         try:
-            session = await open_session(self.url)
+            async with session_with(self.url) as session:
+                changes = await asyncio.to_thread(self._tokens, session)
+                return await self._serve_topics(session, changes)
         except BridgeClosed as error:
             self._failed(error)
             return 0.0
-        began, reason = time.monotonic(), CLOSED_HERE
+
+    def _tokens(self, session: zenoh.Session) -> deque[tuple[str, bool]]:
+        """Return the tokens of the domain, to which later changes are added.
+
+        Waits for the router.
+
+        Raises:
+            BridgeClosed: If there are only tokens of other domains.
+
+        """
+        changes: deque[tuple[str, bool]] = deque()
+
+        def changed(sample: zenoh.Sample) -> None:  # called in a thread of Zenoh
+            changes.append((str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT))
+
+        mine = f"{ROOT}/{self._domain}/"
+        # A full channel would block the question itself, so every token must fit.
+        channel: FifoChannel[zenoh.Reply] = FifoChannel(10 * MOST_ENDPOINTS)
         try:
-            self.state, self.session = "open", session
+            session.liveliness().declare_subscriber(
+                f"{mine}**", Callback(changed, indirect=False), history=True
+            )
+            replies = session.liveliness().get(f"{ROOT}/**", channel, timeout=PATIENCE)
+            tokens = [str(each.ok.key_expr) for each in replies if each.ok is not None]
+        except zenoh.ZError as error:  # it was closed just now
+            why = one_line(error)
+            raise BridgeClosed(f"{self.url}: {why}", why) from None
+        found = [token for token in tokens if token.startswith(mine)]
+        if tokens and not found:
+            others = sorted({token.split("/")[1] for token in tokens})
+            why = (
+                f"there is no node in the domain {self._domain}, but in "
+                f"{one_line(', '.join(others))}: the robot's domain belongs at the end "
+                "of the address, after a /"
+            )
+            raise BridgeClosed(f"{self.url}: {why}", why)
+        changes.extendleft((token, True) for token in found)
+        return changes
+
+    async def _serve_topics(
+        self, session: zenoh.Session, changes: deque[tuple[str, bool]]
+    ) -> float:
+        """Offer the topics until the connection ends, and return its duration."""
+        began, reason = time.monotonic(), CLOSED_HERE
+        self.state, self._session, self._offer = "open", session, Offer()
+        try:
             self._opened()
-            is_there = True
-            while is_there:
+            self._deliver(INTRODUCTION)
+            while session.info.routers_zid():
+                for frame in self._offer.apply(changes):
+                    self._deliver(frame)
+                there = self._offer.channels
+                gone = [k for k, v in self._readers.items() if v.channel not in there]
+                self._end_readers(gone)
                 await asyncio.sleep(LOOK_PERIOD)
-                is_there = bool(session.info.routers_zid())
             reason = "the Zenoh router closed it, or does not answer"
         finally:
-            self.state, self.session = "connecting", None
+            self._end_readers(self._readers)
+            self.state = "connecting" if self._again else "closed"
+            self._session = None
             self._closed(reason)
-            await close_session(session)
         return time.monotonic() - began
 
-    def heard(self) -> None:
-        """Note that the router sent something."""
+    def nodes(self, topic: str, *, publish: bool) -> list[str] | None:
+        """Return the nodes that publish or read a topic; None without a connection."""
+        if self.state != "open":
+            return None
+        return self._offer.nodes(topic, publish=publish)
+
+    def _deliver(self, frame: bytes | bytearray) -> None:
         self._heard = time.monotonic()
+        super()._deliver(frame)
+
+    def _send(self, frame: bytes) -> None:
+        """Begin and end subscriptions; nothing else is asked of a robot."""
+        asked = msgspec.json.decode(frame)
+        for each in asked.get("subscriptions", ()):
+            self._readers[each["id"]] = self._read(each["id"], each["channelId"])
+        self._end_readers(asked.get("subscriptionIds", ()))
+
+    def _read(self, id: int, channel: int) -> "_Reader":
+        assert self._session is not None
+        source = self._offer.channels[channel]
+        reader = _Reader(id, channel, source.topic, self._deliver)
+        handler = Callback(reader.came, indirect=False)
+        key = f"{self._domain}/{source.key}"
+        try:
+            if self._offer.is_latched(source):
+                kept = ext.HistoryConfig(detect_late_publishers=True)
+                reader.subscriber = ext.declare_advanced_subscriber(
+                    self._session, key, handler, history=kept
+                )
+            else:
+                reader.subscriber = self._session.declare_subscriber(key, handler)
+        except zenoh.ZError as error:  # it was closed just now
+            raise BridgeClosed(f"{self.url}: {one_line(error)}") from None
+        return reader
+
+    def _end_readers(self, ids: Iterable[int]) -> None:
+        for id in list(ids):
+            with suppress(zenoh.ZError):  # the session was closed just now
+                self._readers.pop(id).subscriber.undeclare()
 
 
 class _Reader:
-    """The subscription to a key at the router, and the messages that wait.
+    """The messages of a subscription at the router that wait to be delivered.
 
     Args:
-        session: The session with the router.
-        key: The key of the messages.
-        latched: Whether publishers have kept messages, which are asked for.
-        take: Called with each message in the model's thread.
-        lossy: Called there when messages were dropped.
+        id: The subscription.
+        channel: What is subscribed to.
+        topic: The topic.
+        deliver: Called with each frame in the model's thread.
 
     """
 
     def __init__(
-        self,
-        session: zenoh.Session,
-        key: str,
-        latched: bool,
-        take: Callable[[Sample], None],
-        lossy: Callable[[], None],
+        self, id: int, channel: int, topic: str, deliver: Callable[[bytes], None]
     ) -> None:
-        self.key, self.latched = key, latched
-        self._take, self._lossy = take, lossy
+        self.channel = channel
+        self.subscriber: Any = None
+        self._id = id
+        self._topic = topic
+        self._deliver = deliver
         self._loop = asyncio.get_running_loop()
         self._lock = threading.Lock()
-        self._waiting: deque[Sample] = deque()
+        self._waiting: deque[bytes] = deque()
         self._size = 0
-        self._dropped = self._ended = False
-        handler = Callback(self._came, indirect=False)
-        kept = ext.HistoryConfig(detect_late_publishers=True)
-        self._subscriber: Any = (
-            ext.declare_advanced_subscriber(session, key, handler, history=kept)
-            if latched
-            else session.declare_subscriber(key, handler)
-        )
+        self._dropped = False
 
-    def _came(self, sample: zenoh.Sample) -> None:
-        """Keep a message until it is read; called in a thread of Zenoh."""
+    def came(self, sample: zenoh.Sample) -> None:
+        """Keep a message until it is delivered; called in a thread of Zenoh."""
         size = len(sample.payload)
         # Of a message that is too long the size is enough to refuse it.
         payload = sample.payload.to_bytes() if size <= MAX_FRAME else b""
         attachment = sample.attachment.to_bytes() if sample.attachment else b""
+        frame = message_frame(self._id, self._topic, payload, size, attachment)
         with self._lock:
             is_first = not self._waiting
-            self._waiting.append(Sample(payload, size, attachment))
-            self._size += len(payload)
+            self._waiting.append(frame)
+            self._size += len(frame)
             while len(self._waiting) > MOST_WAITING or (
                 self._size > MOST_WAITING_BYTES and len(self._waiting) > 1
             ):
-                self._size -= len(self._waiting.popleft().payload)
+                self._size -= len(self._waiting.popleft())
                 self._dropped = True
         if is_first and not self._loop.is_closed():
-            self._loop.call_soon_threadsafe(self._read)
+            self._loop.call_soon_threadsafe(self._deliver_waiting)
 
-    def _read(self) -> None:
+    def _deliver_waiting(self) -> None:
         with self._lock:
             waiting, self._waiting, self._size = self._waiting, deque(), 0
             dropped, self._dropped = self._dropped, False
         if dropped:
-            self._lossy()
-        for sample in waiting:
-            if self._ended:
-                return
-            try:
-                self._take(sample)
-            except Exception:
-                log.exception("a message on %s was lost", self.key)
-
-    def end(self) -> None:
-        """End the subscription, and forget what waits."""
-        self._ended = True
-        self._subscriber.undeclare()
+            self._deliver(remark(f"{self._topic}: {LOSSY}"))
+        for frame in waiting:
+            self._deliver(frame)
 
 
-class RmwZenohLink(ReconnectingLink):
-    """The topics of one domain of a Zenoh router; reconnects after each loss.
+class _Graph(FoxgloveGraph):
+    async def nodes(
+        self, kind: Literal["publishers", "subscribers"], topic: str
+    ) -> list[str] | None:
+        lane = self._main.connection
+        assert isinstance(lane, RouterConnection)
+        return lane.nodes(topic, publish=kind == "publishers")
+
+    async def set_parameter(self, name: str, value: Any, patience: float) -> Any:
+        url = self._main.connection.url
+        raise ServiceError(f"{name} cannot be set: WebMap only reads {url}")
+
+
+class RmwZenohLink(FoxgloveLink):
+    """The topics of one domain of a Zenoh router; nothing is published or called.
 
     Args:
         url: The bridge's address: ``zenoh-ros2://host:port/domain``.
@@ -250,187 +319,24 @@ class RmwZenohLink(ReconnectingLink):
         callbacks: Those of the bridge.
 
     Raises:
-        ConfigError: If the address has no valid domain, or Zenoh is not installed.
+        ConfigError: If the address has no valid domain.
 
     """
 
-    def __init__(self, url: str, name: str, **callbacks: Unpack[LinkCallbacks]) -> None:
-        super().__init__(name, **callbacks)
-        self._url, self._domain = url, domain_of(url)
-        self.lane = _RouterConnection(
-            url,
-            opened=self._opened,
-            received=lambda _frame: None,
-            closed=self._lost,
-            failed=self._not_opened,
-        )
-        self.graph = RmwZenohGraph(url, self._ask)
-        self._topics: dict[str, Topic] = {}
-        self._readers: dict[str, _Reader] = {}
-        self._complaints: set[str] = set()
-
-    async def stop(self) -> None:
-        """Close the connection; keep the subscriptions for another start."""
-        await self.lane.stop()
-
-    def subscribe(self, topic: Topic) -> None:
-        """Subscribe to a topic, now or when a node announces it."""
-        self._topics[topic.name] = topic
-        self._attach(topic.name)
-
-    def unsubscribe(self, topic: Topic) -> None:
-        """End the subscription to a topic."""
-        self._topics.pop(topic.name, None)
-        self._detach(topic.name)
-
-    def published_type(self, topic: str) -> str | None:
-        """Return None: nothing is published."""
-        return None
+    lane_type = RouterConnection
+    graph_type = _Graph
 
     def publish(self, topic: str, *_: Any, **__: Any) -> None:
         """Raise BridgeError: WebMap sends nothing to this robot."""
-        raise BridgeError(f"{topic} is not published: WebMap only reads {self._url}")
-
-    def unadvertise(self, topic: str) -> None:
-        """Do nothing: nothing is published."""
+        raise BridgeError(
+            f"{topic} is not published: WebMap only reads {self.lane.url}"
+        )
 
     async def call_service(self, service: str, *_: Any, **__: Any) -> Any:
         """Raise ServiceError: WebMap sends nothing to this robot."""
-        raise ServiceError(f"{service} is not called: WebMap only reads {self._url}")
-
-    # The connection.
-
-    def _opened(self) -> None:
-        super()._opened()
-        session, loop = self.lane.session, asyncio.get_running_loop()
-        assert session is not None
-
-        def changed(sample: zenoh.Sample) -> None:  # called in a thread of Zenoh
-            token, is_there = str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT
-            if not loop.is_closed():
-                loop.call_soon_threadsafe(self._changed, session, token, is_there)
-
-        session.liveliness().declare_subscriber(
-            f"{ROOT}/{self._domain}/**", Callback(changed, indirect=False), history=True
+        raise ServiceError(
+            f"{service} is not called: WebMap only reads {self.lane.url}"
         )
-        for topic in list(self._topics.values()):
-            topic.begin_anew()
-        self._on_open()
-
-    def _lost(self, reason: str) -> None:
-        for name in list(self._readers):
-            self._detach(name)
-        self.graph.clear()
-        self._complaints.clear()
-        super()._lost(reason)
-        self._on_close(reason)
-
-    async def _ask(self) -> list[str]:
-        """Return the tokens of the domain, also without an open connection."""
-        open_now = self.lane.session
-        session = open_now or await open_session(self._url)
-        try:
-            return await asyncio.to_thread(self._tokens, session)
-        except zenoh.ZError as error:  # it was closed just now
-            raise BridgeClosed(f"{self._url}: {one_line(error)}") from None
-        finally:
-            if open_now is None:
-                await close_session(session)
-
-    def _tokens(self, session: zenoh.Session) -> list[str]:
-        """Return the tokens of the domain; waits for the router."""
-        # A full channel would block the question itself, so every token must fit.
-        channel: FifoChannel[zenoh.Reply] = FifoChannel(10 * MOST_ENDPOINTS)
-        replies = session.liveliness().get(f"{ROOT}/**", channel, timeout=PATIENCE)
-        tokens = [str(each.ok.key_expr) for each in replies if each.ok is not None]
-        found = [t for t in tokens if t.startswith(f"{ROOT}/{self._domain}/")]
-        if tokens and not found:
-            others = sorted({token.split("/")[1] for token in tokens})
-            raise ServiceError(
-                f"{self._url}: there is no node in the domain {self._domain}, but in "
-                f"{one_line(', '.join(others))}: the robot's domain belongs at the end "
-                "of the address, after a /"
-            )
-        return found
-
-    # Topics.
-
-    def _changed(self, session: zenoh.Session, token: str, is_there: bool) -> None:
-        if session is not self.lane.session:
-            return  # it was on its way when the connection ended
-        self.lane.heard()
-        if not is_there:
-            self.graph.remove(token)
-            return
-        try:
-            topic = self.graph.add(token)
-        except BridgeError as error:
-            self.stats.malformed += 1
-            self._complain(str(error))
-            return
-        if topic is not None:
-            self._attach(topic)
-
-    def _attach(self, name: str) -> None:
-        """Read the first publisher of a wanted topic that can be read; report others.
-
-        Publishers of the same type are read together, as one key.
-        """
-        topic, session = self._topics.get(name), self.lane.session
-        if topic is None or session is None:
-            return
-        stated, refused, readable = topic.message_type, "", []
-        for each in self.graph.endpoints("publishers", name)[:MOST_PUBLISHERS]:
-            if stated is not None and not same_type(stated, each.type):
-                continue
-            why = refusal_of(each.type, each.hash)
-            if why is None:
-                readable.append(each)
-            else:
-                refused = f"{name} is not read from {one_line(each.node)}: {why}"
-                self._complain(refused)
-        if not readable:
-            if refused:
-                topic.over(BridgeError(refused))
-            return
-        type, key = readable[0].type, f"{self._domain}/{readable[0].key}"
-        latched = any(each.latched for each in readable if each.type == type)
-        reader = self._readers.get(name)
-        if reader is not None and (reader.key, reader.latched) == (key, latched):
-            return
-        self._detach(name)
-        topic.begin_anew()
-        take, lossy = partial(self._take, topic, type), f"{name}: {LOSSY}"
-        self._readers[name] = _Reader(
-            session, key, latched, take, partial(self._complain, lossy)
-        )
-
-    def _detach(self, name: str) -> None:
-        reader = self._readers.pop(name, None)
-        if reader is not None:
-            reader.end()
-
-    def _take(self, topic: Topic, type: str, sample: Sample) -> None:
-        self.stats.frames += 1
-        self.stats.bytes += sample.size
-        self.lane.heard()
-        try:
-            message, stamp = message_of(topic, type, sample)
-        except BridgeError as error:
-            self.stats.malformed += 1
-            self._complain(str(error))
-            topic.over(error)
-            return
-        self.graph.stamp = (stamp, time.monotonic())
-        self._on_message(topic, message)
-
-    def _complain(self, text: str) -> None:
-        """Report a fault, once for each connection."""
-        if text in self._complaints or len(self._complaints) >= MOST_COMPLAINTS:
-            return
-        self._complaints.add(text)
-        log.warning("%s: %s", self._name, text)
-        self._report(BridgeError(f"{self._name}: {text}"))
 
 
 LINKS[SCHEME] = RmwZenohLink

@@ -293,19 +293,15 @@ async def close_soon(socket: "WebSocketConnection") -> None:
             await socket.close()
 
 
-def why_not_reached(error: Exception) -> str:
-    """Return why a connection could not be opened, as a part of a sentence."""
-    if isinstance(error, TimeoutError):
-        return f"no answer within {CONNECT_TIMEOUT:g} s"
-    if isinstance(error, ConnectionRefusedError):
-        return "the connection was refused, nothing listens there"
-    if isinstance(error, socket.gaierror):
-        return f"the host's name is not known ({error.strerror})"
-    return str(error) or type(error).__name__
-
-
 def _not_reached(named: str, url: str, error: Exception) -> BridgeClosed:
-    why = why_not_reached(error)
+    if isinstance(error, TimeoutError):
+        why = f"no answer within {CONNECT_TIMEOUT:g} s"
+    elif isinstance(error, ConnectionRefusedError):
+        why = "the connection was refused, nothing listens there"
+    elif isinstance(error, socket.gaierror):
+        why = f"the host's name is not known ({error.strerror})"
+    else:
+        why = str(error) or type(error).__name__
     if "HTTP 400" in why and named == "rosbridge":
         address = url.replace("ws", "foxglove", 1)
         why += f"; if a Foxglove bridge is there, its address is {address}"
