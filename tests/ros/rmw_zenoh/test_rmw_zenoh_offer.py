@@ -89,6 +89,8 @@ def test_a_namespace_and_transient_local_are_read():
         TALKER.replace("%chatter", "%chat ter"),
         TALKER.replace("%chatter", "%%chatter"),
         TALKER.replace("%chatter", "%" + "long" * 100),
+        TALKER.replace(STRING, "long" * 1000),
+        TALKER.replace("String_", "long" * 1000 + "_"),
     ],
 )
 def test_a_lying_token_is_refused_in_words(token):
@@ -168,6 +170,13 @@ def test_remarks_about_lying_tokens_are_few():
     remarks = [each for each in found if isinstance(each, Status)]
     assert 1 < len(remarks) < 100
     assert found[-1].channels
+
+
+def test_as_many_channels_as_there_may_be_fit_into_one_frame():
+    every = range(offers.MOST_ENDPOINTS)
+    long = "h" * (offers.MOST_TOKEN - len(odometry(99_999, topic="%o99999", hash="")))
+    tokens = [odometry(i, topic=f"%o{i}", hash=long) for i in every]
+    assert len(changed(Offer(), tokens)[0]) == offers.MOST_ENDPOINTS
 
 
 def test_without_changes_nothing_is_sent():

@@ -32,6 +32,9 @@ ROOT = "@ros2_lv"
 MOST_ENDPOINTS = 20_000
 """Most publishers and subscribers of one domain; others are left out."""
 
+MOST_TOKEN = 1_200
+"""Most characters of a token; those of ROS are shorter, as names are."""
+
 INTRODUCTION = operation("serverInfo")
 """The first frame: nothing but topics is offered."""
 
@@ -90,7 +93,7 @@ def read_token(token: str) -> Endpoint | None:
     kind = parts[5] if len(parts) > 5 and parts[0] == ROOT else ""
     if kind in _OTHER_KINDS:
         return None
-    if kind in _KINDS and len(parts) >= _PARTS:
+    if kind in _KINDS and len(parts) >= _PARTS and len(token) <= MOST_TOKEN:
         space, node, name, type, hash, quality = parts[7:_PARTS]
         topic, match = name.replace("%", "/"), _TYPE.fullmatch(type)
         if match is not None and is_topic(topic) and topic == normalise_topic(topic):
