@@ -14,7 +14,7 @@ from webmap.ros.foxglove.protocol import (
 )
 from webmap.ros.limits import MAX_FRAME
 from webmap.ros.rmw_zenoh import offer as offers
-from webmap.ros.rmw_zenoh.offer import Offer, message_frame, read_token
+from webmap.ros.rmw_zenoh.offer import Offer, change_of, message_frame, read_token
 from webmap.ros.sockets.frame_reader import whole_of
 
 # The examples of docs/design.md of rmw_zenoh.
@@ -35,8 +35,8 @@ def odometry(i, kind="MP", topic="%odom", hash="h", quality=""):
 
 def apply(offer, came=(), gone=()):
     """Return what a client reads after tokens came and went."""
-    changes = deque([(token, True) for token in came])
-    changes.extend((token, False) for token in gone)
+    changes = deque(change_of(token, came=True) for token in came)
+    changes.extend(change_of(token, came=False) for token in gone)
     frames = [receive(frame) for frame in offer.apply(changes)]
     assert not changes
     return frames
@@ -125,7 +125,7 @@ def test_more_tokens_than_the_limit_are_left_out(monkeypatch):
     offer = Offer()
     remark, _, new = apply(offer, [odometry(i, topic=f"%o{i}") for i in range(5)])
     assert isinstance(remark, Status)
-    assert "more than 3 publishers" in remark.message
+    assert remark.message == offers.TOO_MANY
     assert len(new.channels) == 3
     changed(offer, [odometry(2, topic="%o2")])  # it is known already
     changed(offer, gone=[odometry(0, topic="%o0")])

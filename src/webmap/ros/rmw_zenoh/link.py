@@ -28,7 +28,9 @@ from webmap.ros.rmw_zenoh.offer import (
     INTRODUCTION,
     MOST_ENDPOINTS,
     ROOT,
+    Change,
     Offer,
+    change_of,
     message_frame,
     remark,
 )
@@ -140,7 +142,7 @@ class RouterConnection(BridgeConnection):
             self._failed(error)
             return 0.0
 
-    def _tokens(self, session: zenoh.Session) -> deque[tuple[str, bool]]:
+    def _tokens(self, session: zenoh.Session) -> deque[Change]:
         """Return the tokens of the domain, to which later changes are added.
 
         Waits for the router.
@@ -149,10 +151,11 @@ class RouterConnection(BridgeConnection):
             BridgeClosed: If there are only tokens of other domains.
 
         """
-        changes: deque[tuple[str, bool]] = deque()
+        changes: deque[Change] = deque()
 
         def changed(sample: zenoh.Sample) -> None:  # called in a thread of Zenoh
-            changes.append((str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT))
+            came = sample.kind == zenoh.SampleKind.PUT
+            changes.append(change_of(str(sample.key_expr), came=came))
 
         mine = f"{ROOT}/{self._domain}/"
         # A full channel would block the question itself, so every token must fit.
@@ -175,11 +178,11 @@ class RouterConnection(BridgeConnection):
                 "of the address, after a /"
             )
             raise BridgeClosed(f"{self.url}: {why}", why)
-        changes.extendleft((token, True) for token in found)
+        changes.extendleft([change_of(token, came=True) for token in found])
         return changes
 
     async def _serve_topics(
-        self, session: zenoh.Session, changes: deque[tuple[str, bool]]
+        self, session: zenoh.Session, changes: deque[Change]
     ) -> float:
         """Offer the topics until the connection ends, and return its duration."""
         began, reason = time.monotonic(), CLOSED_HERE

@@ -9,7 +9,7 @@ import itertools
 import re
 from collections import deque
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from webmap.base.errors import ProtocolError
 from webmap.base.text import one_line
@@ -31,6 +31,11 @@ ROOT = "@ros2_lv"
 
 MOST_ENDPOINTS = 20_000
 """Most publishers and subscribers of one domain; others are left out."""
+
+TOO_MANY = (
+    f"got more than {MOST_ENDPOINTS} publishers and subscribers; the others are left "
+    "out"
+)
 
 MOST_TOKEN = 1_200
 """Most characters of a token; those of ROS are shorter, as names are."""
@@ -82,6 +87,10 @@ class Endpoint(NamedTuple):
     source: Source
 
 
+Change: TypeAlias = tuple[str, Endpoint | ProtocolError | None]
+"""A token, and what it announces now, or why it cannot be read."""
+
+
 def read_token(token: str) -> Endpoint | None:
     """Return what a token announces; None for a node, a service or a client.
 
@@ -107,6 +116,14 @@ def read_token(token: str) -> Endpoint | None:
     raise ProtocolError(
         f"got the token {one_line(token, 300)}, which no rmw_zenoh makes"
     )
+
+
+def change_of(token: str, *, came: bool) -> Change:
+    """Return the change by a token that came or went; this never raises."""
+    try:
+        return token, read_token(token) if came else None
+    except ProtocolError as error:
+        return token, error
 
 
 def remark(text: str) -> bytes:
@@ -159,38 +176,23 @@ class Offer:
         every = self._endpoints.values()
         return any(e.latched and e.publishes and e.source == source for e in every)
 
-    def apply(self, changes: deque[tuple[str, bool]]) -> Iterator[bytes]:
-        """Take tokens, and return the frames for what they change.
-
-        Args:
-            changes: Each token, and whether it came or went; emptied here.
-
-        """
+    def apply(self, changes: deque[Change]) -> Iterator[bytes]:
+        """Take changes, which are removed, and return the frames for them."""
         if not changes:
             return
         faults: dict[str, None] = {}
         while changes:
-            token, came = changes.popleft()
-            if not came:
+            token, found = changes.popleft()
+            if isinstance(found, ProtocolError):
+                faults[str(found)] = None
+            elif found is None:
                 self._endpoints.pop(token, None)
-                continue
-            try:
-                self._add(token)
-            except ProtocolError as error:
-                faults[str(error)] = None
+            elif len(self._endpoints) < MOST_ENDPOINTS or token in self._endpoints:
+                self._endpoints[token] = found
+            else:
+                faults[TOO_MANY] = None
         yield from map(remark, itertools.islice(faults, MOST_STATUSES))
         yield from self._changed_channels()
-
-    def _add(self, token: str) -> None:
-        endpoint = read_token(token)
-        if endpoint is None:
-            return
-        if len(self._endpoints) >= MOST_ENDPOINTS and token not in self._endpoints:
-            raise ProtocolError(
-                f"got more than {MOST_ENDPOINTS} publishers and subscribers; the "
-                "others are left out"
-            )
-        self._endpoints[token] = endpoint
 
     def _changed_channels(self) -> Iterator[bytes]:
         every = self._endpoints.values()
