@@ -14,7 +14,7 @@ from benchmarks.harness import Comparison, Contender, Figures, compare
 from benchmarks.processes import started, used
 from webmap.agents.address import locator
 from webmap.agents.peer import COPIES
-from webmap.agents.router_access import zenoh_config
+from webmap.base.zenoh_sessions import zenoh_config
 
 RATE = 1000
 """Messages a second of the sender."""

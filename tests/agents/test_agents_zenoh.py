@@ -15,6 +15,7 @@ from webmap.agents.router import free_port, open_router, read_users
 from webmap.agents.router_access import RouterUser
 from webmap.base.errors import WireError
 from webmap.base.tls import TlsFiles, tls_files
+from webmap.base.zenoh_sessions import why_not_reached
 
 pytestmark = pytest.mark.slow
 
@@ -392,3 +393,7 @@ def test_an_agent_hears_only_from_the_router_what_it_may_send(users):
                 {*heard} == {"bay3", "west"},
             )[2]
         )
+
+
+def test_a_host_name_that_cannot_be_sent_is_a_reason():
+    assert "label empty or too long" in why_not_reached("tcp/robot..x:7447")

@@ -73,12 +73,15 @@ ROSBRIDGE_WORDS = re.compile(
 PROTOCOL_ROOMS = (
     "ros/rosbridge/",
     "ros/foxglove/",
+    "ros/rmw_zenoh/",
     "gate/",  # the gate has separate sockets to the rosbridge
     "agents/",  # an agent forwards the requests of displays to its rosbridge
     "testing/",  # the test robots have rosbridges
 )
-# These messages name rosapi, as users must start it; a replay starts it, too.
+# These messages name rosapi, as users must start it; a replay starts it, too. A setting
+# of Zenoh has the name of one of rosbridge.
 ROSBRIDGE_TEXTS = {
+    "base/zenoh_sessions.py": {"max_message_size"},
     "bags/player.py": {"rosapi"},
     "cli/doctor.py": {"rosapi"},
     "fleet/search.py": {"rosapi"},

@@ -8,7 +8,7 @@ Open ``gates`` first: all gates that a process uses. For the gates, ``gate_messa
 has what is sent, ``displays`` the agent's side and ``remote_gate`` the display's. For
 the robot's data, these are ``data_messages``, ``bridge_proxy`` and ``link``; for
 cameras over HTTP, ``camera_messages``, ``agent_cameras`` and ``remote_camera``.
-``peer`` has the sessions with the router, ``router_access`` the user and the reasons
-of a failure, and ``address`` the keys. ``announcements`` make agents and their robots
-known. ``router`` is the configuration of a router in this process.
+``peer`` has the sessions with the router, ``router_access`` the user, and ``address``
+the keys. ``announcements`` make agents and their robots known. ``router`` is the
+configuration of a router in this process.
 """

@@ -15,16 +15,16 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from webmap.agents.address import ANYONE, locator
-from webmap.agents.router_access import (
+from webmap.agents.address import locator
+from webmap.agents.router_access import RouterUser
+from webmap.base.errors import WireError
+from webmap.base.text import one_line
+from webmap.base.zenoh_sessions import (
     OPENING,
-    RouterUser,
     client_settings,
     why_not_reached,
     zenoh_config,
 )
-from webmap.base.errors import WireError
-from webmap.base.text import one_line
 
 if TYPE_CHECKING:
     import zenoh
@@ -89,7 +89,8 @@ class Peer:
         self.user = user or RouterUser.from_environment()
         self.trouble: str | None = f"waiting for the router at {self.locator}"
         """Why the router is not connected; None if it is."""
-        self._config = client_settings(self.locator, self.user, most)
+        who = (self.user.name, self.user.password, self.user.ca)
+        self._config = client_settings(self.locator, most, *who)
         zenoh_config()  # to fail here, not in a thread
         self._lock = threading.Lock()
         self._ended = threading.Event()
@@ -328,8 +329,7 @@ class Peer:
 
     def _explain(self) -> None:
         """Note why the router cannot be reached, and log it when it changes."""
-        user = "" if self.user.name == ANYONE else self.user.name
-        why = why_not_reached(self.locator, user, self.user.ca)
+        why = why_not_reached(self.locator, self.user.ca) or self.user.refusal
         trouble = f"cannot reach the router at {self.locator}: {one_line(why)}"
         if trouble != self.trouble:
             log.warning("%s", trouble)

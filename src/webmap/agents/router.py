@@ -22,9 +22,9 @@ from webmap.agents.address import (
 )
 from webmap.agents.gate_messages import MOST_SAMPLE
 from webmap.agents.peer import MOST_BYTES
-from webmap.agents.router_access import zenoh_config
 from webmap.base.errors import ConfigError
 from webmap.base.tls import TlsFiles
+from webmap.base.zenoh_sessions import zenoh_config
 
 if TYPE_CHECKING:
     import zenoh

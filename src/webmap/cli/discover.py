@@ -29,7 +29,8 @@ def discover(
 ) -> None:
     """List the robots behind bridges, their topics, and the rule for each topic.
 
-    URL is the address of a rosbridge, or of a Foxglove bridge: foxglove://robot:8765.
+    URL is the address of a rosbridge, of a Foxglove bridge: foxglove://robot:8765, or
+    of a robot with rmw_zenoh: zenoh-ros2://robot:7447.
     The address of a router is that of all its agents: zenoh://host:7447. Nothing is
     moved or changed. The exit code is 1 if no robot is found.
 

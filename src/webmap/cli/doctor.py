@@ -77,7 +77,8 @@ def doctor(
 ) -> None:
     """Diagnose a bridge and the robots behind it, and suggest what to do.
 
-    URL is the address of a rosbridge, or of a Foxglove bridge: foxglove://robot:8765.
+    URL is the address of a rosbridge, of a Foxglove bridge: foxglove://robot:8765, or
+    of a robot with rmw_zenoh: zenoh-ros2://robot:7447.
     The address of an agent is that of its rosbridge: zenoh://host:7447/bay3; that of a
     router is that of all its agents.
 

@@ -58,8 +58,9 @@ def record(
 ) -> None:
     """Record the topics behind a bridge into a bag.
 
-    URL is the address of a rosbridge, of a Foxglove bridge: foxglove://robot:8765, or
-    of an agent: zenoh://host:7447/bay3.
+    URL is the address of a rosbridge, of a Foxglove bridge: foxglove://robot:8765, of a
+    robot with rmw_zenoh: zenoh-ros2://robot:7447, or of an agent:
+    zenoh://host:7447/bay3.
 
     The bag has the format of the robot's ROS: a .bag file, or a folder with an MCAP
     file. Topics that appear later are recorded too. Nothing is moved. This command

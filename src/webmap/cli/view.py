@@ -98,9 +98,10 @@ def view(
 
     URL is the address of a rosbridge: ws://robot:9090, of a Foxglove bridge:
     foxglove://robot:8765, of a router with agents: zenoh://host:7447, or of one of
-    them: zenoh://host:7447/bay3. The robots behind a bridge are found by their topics,
-    also those that appear later; --show lists the topics in use. Correct a wrong guess
-    with --set, or list a robot's topics with --robot.
+    them: zenoh://host:7447/bay3. A robot with rmw_zenoh can be seen and not driven:
+    zenoh-ros2://robot:7447. The robots behind a bridge are found by their topics, also
+    those that appear later; --show lists the topics in use. Correct a wrong guess with
+    --set, or list a robot's topics with --robot.
 
     \b
     webmap view ws://robot:9090

@@ -44,7 +44,7 @@ from webmap.fleet.robot_files import (
 )
 from webmap.poses.alignment import alignments
 from webmap.ros.foxglove.as_rosbridge import RosbridgeOfFoxglove
-from webmap.ros.names import is_foxglove_url, is_type, normalise_topic
+from webmap.ros.names import has_gate, is_foxglove_url, is_type, normalise_topic
 from webmap.ros.rosbridge.calls import Calls
 from webmap.ros.rosbridge.events import Publish
 from webmap.ros.rosbridge.graph import BridgeGraph
@@ -92,6 +92,11 @@ class Agent:
     ) -> None:
         self.name = address.checked_name(name)
         self.url = url = robots.bridge.url
+        if not has_gate(url):
+            raise ConfigError(
+                f"got {url}, expected the address of a rosbridge or a Foxglove bridge: "
+                "an agent drives its robots through one of them"
+            )
         self._robots = robots
         self._session = secrets.token_hex(8)
         self._buttons: list[dict[str, str]] = []

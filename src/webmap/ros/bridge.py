@@ -1,7 +1,8 @@
 """The connection to one ROS system, shared by the whole process.
 
 A :class:`Bridge` has topics, messages and services, and refuses messages that only the
-gate may publish. The wire protocols are in ``rosbridge`` and ``foxglove``.
+gate may publish. The wire protocols are in ``rosbridge``, ``foxglove`` and
+``rmw_zenoh``.
 """
 
 import asyncio
@@ -44,6 +45,7 @@ _HOMES = {
     "foxgloves": "webmap.ros.foxglove.link",
     "zenoh": "webmap.agents.link",
     "zenohs": "webmap.agents.link",
+    "zenoh-ros2": "webmap.ros.rmw_zenoh.link",
 }
 """Modules of WebMap that add a kind of link when they are imported."""
 
@@ -56,7 +58,7 @@ def _link_type(url: str) -> LinkType:
 
 
 class Bridge:
-    """A connection to one ROS system through a rosbridge or a Foxglove bridge.
+    """A connection to one ROS system, through a rosbridge or a Foxglove bridge.
 
     Creating a bridge opens no connection. The connection opens when WebMap starts, and
     reopens after each loss with all subscriptions and advertisements. Call the methods
@@ -68,7 +70,8 @@ class Bridge:
 
     Args:
         url: Address of a rosbridge, such as ``ws://localhost:9090``, or of a Foxglove
-            bridge, such as ``foxglove://localhost:8765``.
+            bridge, such as ``foxglove://localhost:8765``, or of the Zenoh router of a
+            robot that is only read, such as ``zenoh-ros2://robot:7447``.
         name: Name shown to people; the address if not given.
 
     Raises:

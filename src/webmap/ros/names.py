@@ -15,7 +15,7 @@ _TYPE = re.compile(
 _HOST = re.compile(r"(?:[A-Za-z0-9.-]+|\[[0-9A-Fa-f:.]+\])(?::\d{1,5})?(?:/[^\s]*)?")
 
 DEFAULT_PORTS = {"ws": 80, "wss": 443, "foxglove": 8765, "foxgloves": 8765}
-DEFAULT_PORTS |= {"zenoh": 7447, "zenohs": 7447}
+DEFAULT_PORTS |= {"zenoh": 7447, "zenohs": 7447, "zenoh-ros2": 7447}
 """The port of an address without one, by the scheme: those of all kinds of links."""
 
 PICTURES = ("sensor_msgs/CompressedImage", "sensor_msgs/Image")

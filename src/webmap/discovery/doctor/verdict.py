@@ -111,7 +111,9 @@ def _bridge(seen: BridgeFacts) -> Iterator[Finding]:
     if seen.topics_given or not seen.unlisted:
         yield from _robots(seen)
     if seen.clock is not None:
-        yield from _clock(seen.clock, "A ping" if by_foxglove else "A service call")
+        if has_gate(seen.url):
+            yield _reaction(seen.clock, "A ping" if by_foxglove else "A service call")
+        yield _clock(seen.clock)
     elif not seen.unlisted:
         text = "The bridge does not report its time, so clocks are not compared."
         yield Finding("note", BRIDGE, text)
@@ -165,21 +167,23 @@ def _robots(seen: BridgeFacts) -> Iterator[Finding]:
         )
 
 
-def _clock(clock: Clock, asked: str) -> Iterator[Finding]:
+def _reaction(clock: Clock, asked: str) -> Finding:
     trip = f"{asked} takes {clock.round_trip * 1000:.0f} ms"
     near = "Use a faster connection, such as a cable or a better radio link."
     if clock.round_trip > NO_LOOP:
-        yield Finding("wrong", BRIDGE, f"{trip}: too long for driving.", near)
-    elif clock.round_trip > SLOW_LOOP:
-        yield Finding("warning", BRIDGE, f"{trip}: the robot reacts late.", near)
-    else:
-        yield Finding("good", BRIDGE, f"{trip}.")
+        return Finding("wrong", BRIDGE, f"{trip}: too long for driving.", near)
+    if clock.round_trip > SLOW_LOOP:
+        return Finding("warning", BRIDGE, f"{trip}: the robot reacts late.", near)
+    return Finding("good", BRIDGE, f"{trip}.")
+
+
+def _clock(clock: Clock) -> Finding:
     off = abs(clock.ahead)
     side = "ahead of" if clock.ahead > 0 else "behind"
     if off > SIMULATED:
-        yield Finding("note", BRIDGE, "The robot uses the clock of a simulator.")
-    elif off - clock.round_trip / 2 > CLOCK_OFF:
-        yield Finding(
+        return Finding("note", BRIDGE, "The robot uses the clock of a simulator.")
+    if off - clock.round_trip / 2 > CLOCK_OFF:
+        return Finding(
             "warning",
             BRIDGE,
             f"The robot's clock is {off:.1f} s {side} this machine's.",
@@ -187,8 +191,7 @@ def _clock(clock: Clock, asked: str) -> Iterator[Finding]:
             "WebMap's safety does not depend on them, but stamps of the two machines "
             "do not match.",
         )
-    else:
-        yield Finding("good", BRIDGE, "Both clocks agree.")
+    return Finding("good", BRIDGE, "Both clocks agree.")
 
 
 ON_THE_ROBOT = (

@@ -6,14 +6,13 @@ in time gets no further calls.
 """
 
 import asyncio
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from webmap.base.errors import ConfigError, ProtocolError, ServiceError
 from webmap.ros.foxglove.messages import format_of_part
 from webmap.ros.foxglove.protocol import Service
 from webmap.ros.foxglove.session import Session
-from webmap.ros.received_message import BridgeStats
 
 OFFERED_WITHIN = 2.0
 """Longest wait for a service that the server does not offer yet, in seconds."""
@@ -23,16 +22,12 @@ class Calls:
     """The calls to one server; the first one opens the connection.
 
     Args:
-        url: The address.
-        name: The bridge's name, as shown to people.
-        stats: The counts of the bridge.
+        make_session: Makes a connection, which is not opened again.
 
     """
 
-    def __init__(self, url: str, name: str, stats: BridgeStats) -> None:
-        self._url = url
-        self._name = name
-        self._stats = stats
+    def __init__(self, make_session: Callable[[], Session]) -> None:
+        self._make_session = make_session
         self._session: Session | None = None
         self._retired: set[Session] = set()
 
@@ -40,9 +35,7 @@ class Calls:
         """Return the connection for the next call; it may not be open yet."""
         session = self._session
         if session is None or session.connection.state == "closed":
-            session = Session(
-                self._url, f"{self._name}, calls", self._stats, again=False
-            )
+            session = self._make_session()
             session.connection.start(asyncio.get_running_loop())
             self._session = session
         return session

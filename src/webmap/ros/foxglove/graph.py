@@ -16,6 +16,7 @@ from webmap.ros.foxglove.messages import (
 )
 from webmap.ros.foxglove.protocol import Parameter
 from webmap.ros.foxglove.session import Session
+from webmap.ros.link import PATIENCE
 from webmap.ros.names import same_type
 
 FIRST = 2.0
@@ -50,10 +51,9 @@ class FoxgloveGraph:
 
         """
         session = self._session()
-        found = await session.wait_for(lambda: session.offered() or None, FIRST)
-        if session.info is None:
-            raise ServiceError("the Foxglove bridge did not introduce itself")
-        return found or {}
+        if await session.wait_for(lambda: session.info, PATIENCE) is None:
+            raise ServiceError("the bridge did not introduce itself")
+        return await session.wait_for(lambda: session.offered() or None, FIRST) or {}
 
     async def topic_type(self, topic: str) -> str | None:
         """Return the type of ``topic``, or None if it is not offered."""

@@ -10,6 +10,7 @@ import itertools
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Unpack
 
 from msgspec.structs import replace
@@ -57,16 +58,20 @@ class FoxgloveLink(ReconnectingLink):
 
     """
 
+    lane_type: type[BridgeConnection] = BridgeConnection
+    """The kind of its connections."""
+    graph_type: type[FoxgloveGraph] = FoxgloveGraph
+    """The kind of its graph."""
+
     def __init__(self, url: str, name: str, **callbacks: Unpack[LinkCallbacks]) -> None:
         super().__init__(name, **callbacks)
         self._timer: asyncio.TimerHandle | None = None
         """When the server must have introduced itself."""
         self._published: dict[str, _Published] = {}
         self._ids = itertools.count(1)
-        self._main = Session(
-            url,
+        session = partial(Session, url, stats=self.stats, lane_type=self.lane_type)
+        self._main = session(
             name,
-            self.stats,
             opened=self._opened,
             informed=self._informed,
             closed=self._lost,
@@ -76,18 +81,16 @@ class FoxgloveLink(ReconnectingLink):
             carries=lambda type: not _is_large(type),
             elsewhere=self._open_large,
         )
-        self._large = Session(
-            url,
+        self._large = session(
             f"{name}, large topics",
-            self.stats,
             opened=self._large_opened,
             closed=lambda _reason: self._large_lost(),
             received=self._on_message,
             report=self._report,
             carries=_is_large,
         )
-        self._calls = Calls(url, name, self.stats)
-        self.graph = FoxgloveGraph(self._main, self._calls)
+        self._calls = Calls(partial(session, f"{name}, calls", again=False))
+        self.graph = self.graph_type(self._main, self._calls)
 
     @property
     def lane(self) -> BridgeConnection:

@@ -22,10 +22,14 @@ from webmap.ros.serialized.schemas import (
     read_schema,
     texts_in,
 )
+from webmap.ros.serialized.type_hash import check_hash
 from webmap.ros.serialized.writer import make_writer
 
 _SCHEMAS: dict[str, SchemaEncoding] = {"cdr": "ros2msg", "ros1": "ros1msg"}
 """The usual language of schemas, by the encoding of the messages."""
+
+TYPE_HASH = "rihs01"
+"""In place of the language of a schema: the schema is only the hash of the type."""
 
 SERIALIZED = tuple(_SCHEMAS)
 """The encodings in which WebMap writes to a server, the preferred one first."""
@@ -86,14 +90,27 @@ class Format:
     @property
     def schema(self) -> Schema:
         """The schema; ConfigError if it is invalid."""
+        language, text = self._schema_encoding, self._text
+        if language == TYPE_HASH:
+            check_hash(self.type, text or "")
+            language, text = "ros2msg", None
         # Checked there: any other text is refused with an error.
-        language = cast(SchemaEncoding, self._schema_encoding)
-        return read_schema(self.type, language, self._text)
+        return read_schema(self.type, cast(SchemaEncoding, language), text)
+
+    @property
+    def has_schema(self) -> bool:
+        """Whether there is a schema that can be read."""
+        try:
+            return bool(self.schema)
+        except ConfigError:
+            return False
 
     @property
     def definitions(self) -> Definitions:
         """The definitions of the type and of its parts; ConfigError if not readable."""
         language, name = self._schema_encoding or "", str(split_type(self.type))
+        if language == TYPE_HASH:
+            return shipped(ros2=True)
         texts = texts_in(self._text or "", language, name)
         return Definitions(texts, ros2=language != "ros1msg")
 
@@ -123,7 +140,7 @@ def is_readable(channel: Channel) -> bool:
     """Return whether a channel has messages of ROS that WebMap can read."""
     known = channel.encoding == "json" or (
         channel.encoding in _SCHEMAS
-        and channel.schema_encoding in (*get_args(SchemaEncoding), None, "")
+        and channel.schema_encoding in (*get_args(SchemaEncoding), TYPE_HASH, None, "")
     )
     return known and is_topic(channel.topic) and _is_type(channel.schema_name)
 
@@ -253,12 +270,9 @@ class FoxgloveMessage(ReceivedMessage):
     @property
     def serialized(self) -> tuple[Schema, bytes | bytearray] | None:
         """The message as the node sent it; None for JSON and for an invalid schema."""
-        if not self.is_binary:
+        if not self.is_binary or not self.format.has_schema:
             return None
-        try:
-            return self.format.schema, self.payload
-        except ConfigError:
-            return None
+        return self.format.schema, self.payload
 
     def check_count(self) -> None:
         """Check the number of values in JSON; a reader of the others counts them."""

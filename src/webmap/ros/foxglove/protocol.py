@@ -350,22 +350,22 @@ def subscribe(channels: Mapping[int, int]) -> bytes:
 
     """
     pairs = [{"id": id, "channelId": channel} for id, channel in channels.items()]
-    return _text("subscribe", subscriptions=pairs)
+    return operation("subscribe", subscriptions=pairs)
 
 
 def unsubscribe(ids: Iterable[int]) -> bytes:
     """Return the operation in JSON that ends subscriptions."""
-    return _text("unsubscribe", subscriptionIds=list(ids))
+    return operation("unsubscribe", subscriptionIds=list(ids))
 
 
 def advertise(channels: Iterable[Channel]) -> bytes:
     """Return the operation in JSON that offers topics of this client."""
-    return _text("advertise", channels=list(channels))
+    return operation("advertise", channels=list(channels))
 
 
 def unadvertise(ids: Iterable[int]) -> bytes:
     """Return the operation in JSON that withdraws topics of this client."""
-    return _text("unadvertise", channelIds=list(ids))
+    return operation("unadvertise", channelIds=list(ids))
 
 
 def message(channel: int, payload: bytes) -> bytes:
@@ -390,13 +390,14 @@ def call_service(service: int, call: int, encoding: str, request: bytes) -> byte
 
 def set_parameters(parameters: Iterable[Parameter], id: str) -> bytes:
     """Return the operation in JSON that sets parameters."""
-    return _text("setParameters", parameters=list(parameters), id=id)
+    return operation("setParameters", parameters=list(parameters), id=id)
 
 
 def subscribe_connection_graph() -> bytes:
     """Return the operation in JSON that asks for changes of the graph of nodes."""
-    return _text("subscribeConnectionGraph")
+    return operation("subscribeConnectionGraph")
 
 
-def _text(op: str, **fields: Any) -> bytes:
+def operation(op: str, **fields: Any) -> bytes:
+    """Return an operation in JSON."""
     return msgspec.json.encode({"op": op, **fields})

@@ -61,6 +61,7 @@ class Session:
         carries: Returns whether messages of a type come over this connection.
         elsewhere: Called when a topic is offered whose messages come over another one.
         again: Whether to reopen the connection whenever it ends or fails.
+        lane_type: The kind of its connection.
 
     """
 
@@ -79,6 +80,7 @@ class Session:
         carries: Callable[[str], bool] = lambda _type: True,
         elsewhere: Callable[[], None] = lambda: None,
         again: bool = True,
+        lane_type: type[BridgeConnection] = BridgeConnection,
     ) -> None:
         self.info: protocol.ServerInfo | None = None
         self.services: dict[str, protocol.Service] = {}
@@ -103,7 +105,7 @@ class Session:
         self._changed = asyncio.Event()
         self._ids = itertools.count(1)
         self._forget()
-        self.connection = BridgeConnection(
+        self.connection = lane_type(
             web_socket_url(url),
             opened=self._opened,
             received=self._received,
@@ -170,7 +172,8 @@ class Session:
             async with asyncio.timeout(patience):
                 while (found := look()) is None:
                     if self.failure is not None:
-                        raise BridgeClosed(str(self.failure)) from self.failure
+                        why = self.failure.why
+                        raise BridgeClosed(str(self.failure), why) from self.failure
                     await self._changed.wait()
         except TimeoutError:
             return None
@@ -199,7 +202,7 @@ class Session:
             topic, id = self.topics.get(name), self._id_of.get(name)
             before = None if id is None else self._subscribed[id].channel
             fits = [each for each in self.channels_of(name) if _fits(topic, each)]
-            channel = before if before in fits else next(iter(fits), None)
+            channel = min(fits, key=partial(_rank, before), default=None)
             if channel is not None and not self._carries(channel.schema_name):
                 self._elsewhere()
                 channel = None
@@ -463,6 +466,11 @@ def _fits(topic: Topic | None, channel: protocol.Channel) -> bool:
         return False
     stated = topic.message_type
     return stated is None or same_type(stated, channel.schema_name)
+
+
+def _rank(before: protocol.Channel | None, channel: protocol.Channel) -> Any:
+    """Return 0 first for a schema that can be read, then 0 for the channel before."""
+    return not format_of_channel(channel).has_schema, channel != before
 
 
 def _subscribed(topic: Topic, channel: protocol.Channel) -> _Subscribed:
