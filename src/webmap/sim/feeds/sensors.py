@@ -220,10 +220,12 @@ class Sonars:
         return nearest if nearest >= _SONAR_NEAREST else -math.inf
 
     def _make(self, index: int) -> Message:
-        return {
+        made = {
             "radiation_type": _ULTRASOUND,
             "field_of_view": float32(_SONAR_FIELD),
             "min_range": float32(_SONAR_NEAREST),
             "max_range": float32(_SONAR_FARTHEST),
             "range": float32(self.distance(index)),
         }
+        ros2 = self._node.graph.schema.dialect.is_ros2
+        return made | ({"variance": 0.0} if ros2 else {})
