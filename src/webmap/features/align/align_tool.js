@@ -2,7 +2,7 @@ import { devicesOf } from "../../web/inputs/devices.js";
 import { unapply } from "../../web/view.js";
 import { AlignDrawing, moved, rounded, turned } from "./align_drawing.js";
 import { AlignPanel } from "./align_panel.js";
-import { lay } from "../../web/tools/overlay.js";
+import { endOf, lay } from "../../web/tools/overlay.js";
 import { claimPresses } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/view.js').Point} Point */
@@ -89,7 +89,9 @@ class AlignTool {
     this._drawing = new AlignDrawing(map);
     this._ending = new AbortController();
     this._listen();
-    this._offs = [
+    this.destroy = endOf(
+      () => this._leave(),
+      () => this._ending.abort(),
       lay(map, this._drawing.element),
       lay(map, this._panel.element, "top-left"),
       devicesOf(map.drive).claimEscape(() => this._leave()),
@@ -98,13 +100,7 @@ class AlignTool {
         this._panel.close();
       }),
       map.onView(() => this._draw()),
-    ];
-  }
-
-  destroy() {
-    this._leave();
-    this._ending.abort();
-    for (const off of this._offs) off();
+    );
   }
 
   /** @param {any} message */

@@ -1,7 +1,7 @@
 import { onScreen } from "../../web/tools/aim.js";
 import { button, html, setHidden, setText, svg } from "../../web/tools/elements.js";
 import { look } from "../../web/tools/goals.js";
-import { lay } from "../../web/tools/overlay.js";
+import { endOf, lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/tools/aim.js').Pose} Pose */
@@ -47,21 +47,17 @@ export class GoalMarks {
     this._drawing = svg("svg", { class: "webmap-aim-drawing", "aria-hidden": "true" });
     this._labels = html("div", "webmap-goal-labels");
     this._elsewhere = new TopicGoals(map.svg);
-    this._offs = [
-      () => this._elsewhere.destroy(),
+    this.destroy = endOf(
+      this._elsewhere,
       lay(map, this._drawing),
       lay(map, this._labels),
       map.onView(() => this._place()),
-    ];
+    );
   }
 
   /** @param {boolean} aiming Whether a press is for the map below the buttons. */
   letThrough(aiming) {
     this._labels.classList.toggle("aiming", aiming);
-  }
-
-  destroy() {
-    for (const off of this._offs) off();
   }
 
   /**

@@ -1,6 +1,6 @@
 import { onScreen } from "../../web/tools/aim.js";
 import { html, setHidden, setText, svg } from "../../web/tools/elements.js";
-import { lay } from "../../web/tools/overlay.js";
+import { endOf, lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/view.js').Point} Point */
@@ -37,16 +37,12 @@ export class GroundMark {
     this._ring = svg("circle", { r: "17", class: "webmap-ground-ring" });
     this._word = html("span", "webmap-surface webmap-ground-word", { "aria-live": "polite" });
     const drawing = { class: "webmap-aim-drawing", "aria-hidden": "true" };
-    this._offs = [
+    this.destroy = endOf(
       lay(map, svg("svg", drawing, this._ring)),
       lay(map, html("div", "webmap-goal-labels", {}, this._word)),
       map.onView(() => this._draw()),
-    ];
+    );
     this.show(null);
-  }
-
-  destroy() {
-    for (const off of this._offs) off();
   }
 
   /**

@@ -1,7 +1,7 @@
 import { devicesOf } from "../../web/inputs/devices.js";
 import { apply, unapply } from "../../web/view.js";
 import { button, html, setText, svg } from "../../web/tools/elements.js";
-import { lay } from "../../web/tools/overlay.js";
+import { endOf, lay } from "../../web/tools/overlay.js";
 import { claimPresses, tool, toolDrawing, toolName } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/view.js').Point} Point */
@@ -57,19 +57,15 @@ class MeasureTool {
     this._drawing = toolDrawing("webmap-measure-drawing", this._path);
     this._ending = new AbortController();
     this._listen();
-    this._offs = [
+    this.destroy = endOf(
+      () => this._activate(false),
+      () => this._ending.abort(),
       lay(map, this._drawing),
       lay(map, panel, "top-left"),
       devicesOf(map.drive).claimEscape(() => this._leave()),
       map.onView(() => this._draw()),
-    ];
+    );
     this._activate(false);
-  }
-
-  destroy() {
-    this._activate(false);
-    this._ending.abort();
-    for (const off of this._offs) off();
   }
 
   _listen() {
