@@ -1,5 +1,5 @@
 import { devicesOf } from "../../web/inputs/devices.js";
-import { scaleOf, unapply } from "../../web/view.js";
+import { scaleOf } from "../../web/view.js";
 import { button, html, setHidden, setText } from "../../web/tools/elements.js";
 import { LabelMove } from "./labels_move.js";
 import { endOf, lay } from "../../web/tools/overlay.js";
@@ -102,8 +102,7 @@ class Labels {
     const label = labelOf(event.target);
     if (this._active) {
       event.stopPropagation();
-      const { x, y } = this._map.pointOf(event);
-      this._openNew(unapply(this._map.view, x, y));
+      this._openNew(this._map.worldOf(event));
     } else if (label) {
       event.stopPropagation();
       this._open(label);

@@ -1,5 +1,5 @@
 import { devicesOf } from "../../web/inputs/devices.js";
-import { apply, unapply } from "../../web/view.js";
+import { apply } from "../../web/view.js";
 import { button, html, setText, svg } from "../../web/tools/elements.js";
 import { endOf, lay } from "../../web/tools/overlay.js";
 import { claimPresses, tool, toolDrawing, toolName } from "../../web/tools/tool.js";
@@ -111,7 +111,7 @@ class MeasureTool {
     if (this._pointer !== null) return;
     this._pointer = event.pointerId;
     this._map.svg.setPointerCapture(event.pointerId);
-    const from = this._place(event);
+    const from = this._map.worldOf(event);
     this._line = { from, to: from };
     this._draw();
   }
@@ -121,7 +121,7 @@ class MeasureTool {
     if (!this._active) return;
     event.stopImmediatePropagation();
     if (event.pointerId !== this._pointer || !this._line) return;
-    this._line.to = this._place(event);
+    this._line.to = this._map.worldOf(event);
     this._draw();
   }
 
@@ -131,12 +131,6 @@ class MeasureTool {
     event.stopImmediatePropagation();
     this._map.suppressNextClick();
     this._pointer = null;
-  }
-
-  /** @param {PointerEvent} event */
-  _place(event) {
-    const { x, y } = this._map.pointOf(event);
-    return unapply(this._map.view, x, y);
   }
 
   _draw() {

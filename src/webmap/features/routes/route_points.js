@@ -77,8 +77,7 @@ export class RoutePoints {
     const ending = new AbortController();
     const { signal } = ending;
     const move = (/** @type {PointerEvent} */ event) => {
-      const { x, y } = this._map.pointOf(event);
-      this._moved(index, { ...this._points[index], ...this._map.toWorld(x, y) });
+      this._moved(index, { ...this._points[index], ...this._map.worldOf(event) });
     };
     point.addEventListener("pointermove", move, { signal });
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {
