@@ -1,8 +1,7 @@
 import { SPACING } from "../../web/constants.js";
 import { chosen, poseOf, PressAim } from "../../web/tools/aim.js";
 import { button, html, onBeat, setAttribute, setHidden, setText } from "../../web/tools/elements.js";
-import { GoalMarks } from "./goal_marks.js";
-import { GroundMark } from "./ground_mark.js";
+import { GoalMarks, GroundMark } from "./goal_marks.js";
 import { look, sendGoal, ShownGoals } from "../../web/tools/goals.js";
 import { endOf, lay } from "../../web/tools/overlay.js";
 import { showNote, tool, toolName } from "../../web/tools/tool.js";
