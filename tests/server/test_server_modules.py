@@ -208,7 +208,6 @@ def test_the_settings_of_gamepads_pictures_and_recordings_come_when_they_are_use
     text = served_modules(own_files(".js"))[LATER]
     assert set(re.findall(r'^\$modules\["(.+)"\] \?\?= ', text, re.M)) == {
         "features/drive/gamepad_panel.js",
-        "features/drive/gamepad_picture.js",
         "features/export/export_copy.js",
         "features/export/export_picture.js",
         "features/player/player_bar.js",

@@ -2,7 +2,8 @@ import { listenToActions, listenToPanel } from "./side_panel.js";
 import { listenToPalette } from "./palette.js";
 import { listenToRobots } from "./robot_list.js";
 import { markRobots } from "./robot_marks.js";
-import { byId, listenToSheet, nameSheet, onBeat, setText, typing } from "../web/tools/elements.js";
+import { byId, onBeat, setText, typing } from "../web/tools/elements.js";
+import { endOf } from "../web/tools/overlay.js";
 import { foldTools, keepInView, keepSizes, listenToList, listenToTools } from "./view_tools.js";
 
 /**
@@ -41,12 +42,7 @@ export default function attach(map, options, send) {
   keepInView(map, signal);
   listenToSheet(signal);
   foldTools(signal);
-  return {
-    destroy() {
-      ending.abort();
-      for (const off of offs) off();
-    },
-  };
+  return { destroy: endOf(() => ending.abort(), ...offs) };
 }
 
 /**
@@ -80,10 +76,41 @@ function showConnection(drive) {
     count();
   };
   look();
-  const offs = [onBeat(look, 2), drive.on("state", show), drive.on("robot", hear)];
-  return () => {
-    for (const off of offs) off();
+  return endOf(onBeat(look, 2), drive.on("state", show), drive.on("robot", hear));
+}
+
+/**
+ * Open and close the sheet on a narrow screen.
+ *
+ * @param {AbortSignal} signal
+ */
+function listenToSheet(signal) {
+  const handle = byId("sheet");
+  const turn = () => {
+    const open = handle.getAttribute("aria-expanded") === "true";
+    handle.setAttribute("aria-expanded", `${!open}`);
   };
+  handle.addEventListener("click", turn, { signal });
+}
+
+/**
+ * Show the selected robots on the sheet's handle, for a closed sheet.
+ *
+ * @param {MapCanvas} map
+ */
+function nameSheet(map) {
+  const text = byId("sheet-text");
+  const show = () => {
+    const row = `#robots [data-robot="${map.selected}"]`;
+    const name = document.querySelector(`${row} .name`)?.textContent;
+    const states = [...document.querySelectorAll(`${row} .state > *`)]
+      .filter((one) => getComputedStyle(one).display !== "none")
+      .map((one) => one.textContent?.replace(/^ \u00b7 /, ""));
+    const robots = byId("robots-count").textContent ?? "";
+    setText(text, name ? `${name}: ${states.join(" \u00b7 ")}` : robots);
+  };
+  show();
+  return endOf(onBeat(show, 2), map.onSelect(show));
 }
 
 /** Show the number of robots, of those that need someone, and of stale data. */

@@ -19,6 +19,7 @@ import {
   svg,
   typing,
 } from "../web/tools/elements.js";
+import { endOf } from "../web/tools/overlay.js";
 
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {Listed & {row: HTMLElement, need: string}} Row */
@@ -38,18 +39,15 @@ const ORDER_EVERY = 8;
 export function listenToRobots(map, signal) {
   const list = new RobotList(map, signal);
   const choosing = () => byId("robots").classList.toggle("choosing", map.selected !== null);
-  const offs = [
+  choosing();
+  return endOf(
     map.onSelect(choosing),
     map.layout.add("list", {
       read: () => list.choice,
       write: (choice) => list.choose(choice),
       reset: () => list.choose(AT_FIRST),
     }),
-  ];
-  choosing();
-  return () => {
-    for (const off of offs) off();
-  };
+  );
 }
 
 class RobotList {
@@ -121,11 +119,11 @@ class RobotList {
     // The card makes the list lower.
     const resized = new ResizeObserver(() => this._reveal());
     resized.observe(this._list);
-    const offs = [onBeat(() => this._update(), COUNT_EVERY), onBeat(arrange, ORDER_EVERY)];
+    const off = endOf(onBeat(() => this._update(), COUNT_EVERY), onBeat(arrange, ORDER_EVERY));
     signal.addEventListener("abort", () => {
       newcomers.disconnect();
       resized.disconnect();
-      for (const off of offs) off();
+      off();
     });
   }
 

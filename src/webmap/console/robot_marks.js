@@ -1,5 +1,6 @@
 import { WORDS } from "../web/constants.js";
 import { forgetOthers, onBeat, svg } from "../web/tools/elements.js";
+import { endOf } from "../web/tools/overlay.js";
 import { scale as scaled, scaleOf, translate } from "../web/view.js";
 
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
@@ -191,18 +192,19 @@ export function markRobots(map) {
     marks.wall = wallOf();
   };
   addEventListener("resize", read);
-  const offs = [onBeat(update), map.onSelect(update), map.onView(() => marks.place())];
   // With the other modules, before the next painting.
   const first = requestAnimationFrame(() => {
     read();
     update();
   });
-  return () => {
-    removeEventListener("resize", read);
-    cancelAnimationFrame(first);
-    for (const off of offs) off();
-    marks.remove();
-  };
+  return endOf(
+    () => removeEventListener("resize", read),
+    () => cancelAnimationFrame(first),
+    onBeat(update),
+    map.onSelect(update),
+    map.onView(() => marks.place()),
+    () => marks.remove(),
+  );
 }
 
 /** @returns {number} How much larger than on a desk the marks are: the CSS has `--wall`. */

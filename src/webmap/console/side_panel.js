@@ -13,6 +13,7 @@ import {
   onBeat,
   setAttribute,
 } from "../web/tools/elements.js";
+import { endOf } from "../web/tools/overlay.js";
 
 /** @typedef {import('../web/drive.js').Drive} Drive */
 /** @typedef {import('../web/map.js').MapCanvas} MapCanvas */
@@ -155,7 +156,7 @@ export function listenToActions(map, send, signal) {
     show();
   };
   byId("card").addEventListener("click", act, { signal });
-  const offs = [
+  return endOf(
     onBeat(show),
     map.onView(show),
     map.drive.on("robot", ({ robot }) => robot === map.selected && show()),
@@ -163,10 +164,7 @@ export function listenToActions(map, send, signal) {
       if (map.following) map.follow(0);
       show();
     }),
-  ];
-  return () => {
-    for (const off of offs) off();
-  };
+  );
 }
 
 /**

@@ -6,6 +6,7 @@ import { GateLink } from "./link.js";
 import { DriveListeners, Session } from "./motion/session.js";
 import { standingStops } from "./motion/stops.js";
 import { html, setText, stopButton } from "./tools/elements.js";
+import { endOf } from "./tools/overlay.js";
 
 /** @typedef {import('./motion/inputs.js').Axes} Axes */
 /** @typedef {import('./motion/session.js').DriveEvent} DriveEvent */
@@ -410,10 +411,6 @@ export function showBareStop(drive) {
     const waiting = drive.verdicts.map(({ name, text }) => `${name}: ${text}.`);
     setText(result, standingStops(drive.robots.values()) || waiting.join(" "));
   };
-  const offs = [devicesOf(drive).open(), drive.on("step", show)];
   document.body.append(box);
-  return () => {
-    for (const off of offs) off();
-    box.remove();
-  };
+  return endOf(devicesOf(drive).open(), drive.on("step", show), () => box.remove());
 }

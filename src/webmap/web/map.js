@@ -194,6 +194,15 @@ export class MapCanvas {
     return { x: point.x, y: point.y };
   }
 
+  /**
+   * @param {{clientX: number, clientY: number}} event
+   * @returns {Point} Its position, in metres in the world.
+   */
+  worldOf(event) {
+    const { x, y } = this.pointOf(event);
+    return this.toWorld(x, y);
+  }
+
   /** The robot that this viewer selected: its id at the gate, or null. */
   get selected() {
     return this._selected;

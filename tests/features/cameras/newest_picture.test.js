@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { beforeEach, describe, test } from "node:test";
 
-import { NewestPicture } from "../../../src/webmap/features/cameras/newest_picture.js";
+import { NewestPicture } from "../../../src/webmap/features/cameras/camera_cell.js";
 
 const settled = () => new Promise((resolve) => setImmediate(resolve));
 

@@ -2,7 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { FakeElement } from "../../web/tools/fake_elements.js";
-import { GroundMark } from "../../../src/webmap/features/goals/ground_mark.js";
+import { GroundMark } from "../../../src/webmap/features/goals/goal_marks.js";
 import { assign, formation } from "../../../src/webmap/features/goals/goal_tool.js";
 import { look, ShownGoals } from "../../../src/webmap/web/tools/goals.js";
 

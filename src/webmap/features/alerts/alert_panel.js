@@ -8,7 +8,7 @@ import {
   setText,
   svg,
 } from "../../web/tools/elements.js";
-import { lay } from "../../web/tools/overlay.js";
+import { endOf, lay } from "../../web/tools/overlay.js";
 import { foldedTool } from "../../web/tools/tool.js";
 import { Pace, Signals } from "./alert_signal.js";
 
@@ -122,16 +122,13 @@ class AlertPanel {
       this._signals.element,
     );
     this._details.querySelector("summary")?.append(this._badge);
-    this._take = lay(map, this._details, "top-left");
-    this._off = onBeat(() => this._signal(), PERIOD);
+    this.destroy = endOf(
+      onBeat(() => this._signal(), PERIOD),
+      this._signals,
+      lay(map, this._details, "top-left"),
+    );
     this._heard = false;
     this._show(0);
-  }
-
-  destroy() {
-    this._off();
-    this._signals.destroy();
-    this._take();
   }
 
   /** @param {any} message */

@@ -2,7 +2,8 @@ import { devicesOf } from "../../web/inputs/devices.js";
 import { unapply } from "../../web/view.js";
 import { AlignDrawing, moved, rounded, turned } from "./align_drawing.js";
 import { AlignPanel } from "./align_panel.js";
-import { lay } from "../../web/tools/overlay.js";
+import { ARROWS } from "../../web/tools/aim.js";
+import { endOf, lay } from "../../web/tools/overlay.js";
 import { claimPresses } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/view.js').Point} Point */
@@ -32,14 +33,6 @@ const KEY_TURN = 1;
 
 /** Milliseconds between two updates of the robot's position. */
 const FOLLOW_PERIOD = 200;
-
-/** @type {Record<string, [number, number]>} Right and down on the screen. */
-const ARROWS = {
-  ArrowRight: [1, 0],
-  ArrowLeft: [-1, 0],
-  ArrowDown: [0, 1],
-  ArrowUp: [0, -1],
-};
 
 /**
  * Align the map of the selected robot, or of its whole bridge, with the common map.
@@ -89,7 +82,9 @@ class AlignTool {
     this._drawing = new AlignDrawing(map);
     this._ending = new AbortController();
     this._listen();
-    this._offs = [
+    this.destroy = endOf(
+      () => this._leave(),
+      () => this._ending.abort(),
       lay(map, this._drawing.element),
       lay(map, this._panel.element, "top-left"),
       devicesOf(map.drive).claimEscape(() => this._leave()),
@@ -98,13 +93,7 @@ class AlignTool {
         this._panel.close();
       }),
       map.onView(() => this._draw()),
-    ];
-  }
-
-  destroy() {
-    this._leave();
-    this._ending.abort();
-    for (const off of this._offs) off();
+    );
   }
 
   /** @param {any} message */
@@ -214,7 +203,7 @@ class AlignTool {
     event.stopImmediatePropagation();
     event.preventDefault();
     if (this._drag || event.button !== 0) return;
-    const from = this._place(event);
+    const from = this._map.worldOf(event);
     const about = this._drawing.pivot ?? from;
     this._drag = { id: event.pointerId, turns, from, start: this._now, about };
     const target = turns ? this._drawing.handle : this._map.svg;
@@ -228,7 +217,7 @@ class AlignTool {
     event.stopImmediatePropagation();
     const drag = this._drag;
     if (!drag || event.pointerId !== drag.id) return;
-    const to = this._place(event);
+    const to = this._map.worldOf(event);
     if (drag.turns) {
       const degrees = bearing(drag.about, to) - bearing(drag.about, drag.from);
       this._set(turned(drag.start, degrees, drag.about));
@@ -276,12 +265,6 @@ class AlignTool {
   /** @param {KeyboardEvent} event */
   _escape(event) {
     if (event.key === "Escape" && this._leave()) event.preventDefault();
-  }
-
-  /** @param {PointerEvent} event */
-  _place(event) {
-    const { x, y } = this._map.pointOf(event);
-    return unapply(this._map.view, x, y);
   }
 }
 

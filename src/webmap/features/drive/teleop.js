@@ -4,7 +4,7 @@ import { stoppingDistance } from "../../web/motion/measurements.js";
 import { heldByAnother, isLatched, mayTake, stopOf } from "../../web/motion/report.js";
 import { describe, inputsOf } from "../../web/motion/status.js";
 import { svg } from "../../web/tools/elements.js";
-import { lay, overlayOf, ownCorners, ownPlace } from "../../web/tools/overlay.js";
+import { endOf, lay, overlayOf, ownCorners, ownPlace } from "../../web/tools/overlay.js";
 import { GamepadButton } from "./gamepad_button.js";
 import { Panel, Requests, StickPad } from "./teleop_panel.js";
 
@@ -99,8 +99,8 @@ class Teleop {
         this._show();
       },
     };
-    this._ending = new AbortController();
-    const touched = { capture: true, signal: this._ending.signal };
+    const ending = new AbortController();
+    const touched = { capture: true, signal: ending.signal };
     for (const part of [map.svg, overlayOf(map), ...ownCorners()]) {
       for (const kind of ["pointerdown", "focusin"]) {
         part?.addEventListener(kind, () => this._devices.activate(this._drivingMap), touched);
@@ -108,7 +108,11 @@ class Teleop {
     }
     this._touch = matchMedia("(pointer: coarse)");
     const show = () => this._show();
-    this._offs = [
+    this.destroy = endOf(
+      () => ending.abort(),
+      this._stick,
+      this._halos,
+      this._pads,
       ...takes,
       this._devices.addMap(this._drivingMap),
       map.onSelect(() => this._select()),
@@ -119,16 +123,8 @@ class Teleop {
       this._drive.on("state", show),
       // Updates for all other robots can wait for the next step.
       this._drive.on("robot", ({ robot }) => robot === map.selected && show()),
-    ];
+    );
     this._show();
-  }
-
-  destroy() {
-    this._ending.abort();
-    this._stick.destroy();
-    this._halos.destroy();
-    this._pads.destroy();
-    for (const off of this._offs) off();
   }
 
   get _report() {

@@ -1,10 +1,9 @@
 import { SPACING } from "../../web/constants.js";
 import { chosen, poseOf, PressAim } from "../../web/tools/aim.js";
 import { button, html, onBeat, setAttribute, setHidden, setText } from "../../web/tools/elements.js";
-import { GoalMarks } from "./goal_marks.js";
-import { GroundMark } from "./ground_mark.js";
+import { GoalMarks, GroundMark } from "./goal_marks.js";
 import { look, sendGoal, ShownGoals } from "../../web/tools/goals.js";
-import { lay } from "../../web/tools/overlay.js";
+import { endOf, lay } from "../../web/tools/overlay.js";
 import { showNote, tool, toolName } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
@@ -100,27 +99,22 @@ class GoalTool {
     const content = [this._formation, this._apart, this._cancel, this._message];
     this._panel = tool("webmap-aim webmap-goal", "Goals", this._go, ...content);
     this._marks = new GoalMarks(map, (robot) => this._end(robot));
-    this._marking = new Marking(map, (robot) => send({ mark: robot }));
-    this._offs = [
+    this.destroy = endOf(
+      this._aim,
+      this._ground,
+      this._marks,
+      new Marking(map, (robot) => send({ mark: robot })),
       ...(buttons ? [lay(map, this._panel, "top-left")] : []),
       map.onSelect(() => this._selected()),
       this._drive.on("stop", (robot) => this._stopped(robot)),
       this._drive.on("robot", ({ robot, goal }) => this._hear(robot, goal)),
       this._drive.on("gone", (robot) => this._shown.gone(robot)),
       this._drive.on("refused", ({ robot, what, why }) => this._refused(robot, what, why)),
-    ];
-    // Removes the marks of ended goals, and adds marks when the scene arrives.
-    this._offs.push(onBeat(() => this._show()));
+      // Removes the marks of ended goals, and adds marks when the scene arrives.
+      onBeat(() => this._show()),
+    );
     for (const { robot, goal } of this._drive.robots.values()) this._hear(robot, goal);
     this._show();
-  }
-
-  destroy() {
-    this._aim.destroy();
-    this._ground.destroy();
-    this._marks.destroy();
-    this._marking.destroy();
-    for (const off of this._offs) off();
   }
 
   /** @param {any} message */

@@ -1,7 +1,7 @@
 import { scaleOf } from "../../web/view.js";
 import { onScreen, PressAim } from "../../web/tools/aim.js";
 import { button, html, setText, svg } from "../../web/tools/elements.js";
-import { lay } from "../../web/tools/overlay.js";
+import { endOf, lay } from "../../web/tools/overlay.js";
 import { showNote, tool, toolDrawing } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
@@ -64,20 +64,16 @@ class InitialPoseTool {
     this._outline = svg("path", { d: OUTLINE, class: "webmap-locate-arrow" });
     const parts = [this._uncertainty.element, this._outline];
     this._drawing = toolDrawing("webmap-aim-drawing", ...parts);
-    this._offs = [
+    this.destroy = endOf(
+      this._aim,
       lay(map, this._drawing),
       ...(buttons ? [lay(map, this._panel, "top-left")] : []),
       map.onSelect(() => this._selected()),
       map.onView(() => this._draw()),
       this._drive.on("stop", () => this._aim.leave()),
       this._drive.on("robot", ({ robot }) => robot === map.selected && this._show()),
-    ];
+    );
     this._show();
-  }
-
-  destroy() {
-    this._aim.destroy();
-    for (const off of this._offs) off();
   }
 
   /** @param {any} message */

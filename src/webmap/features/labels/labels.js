@@ -1,8 +1,8 @@
 import { devicesOf } from "../../web/inputs/devices.js";
-import { scaleOf, unapply } from "../../web/view.js";
+import { scaleOf } from "../../web/view.js";
 import { button, html, setHidden, setText } from "../../web/tools/elements.js";
 import { LabelMove } from "./labels_move.js";
-import { lay } from "../../web/tools/overlay.js";
+import { endOf, lay } from "../../web/tools/overlay.js";
 import { claimPresses, showNote, tool, toolName } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
@@ -54,20 +54,16 @@ class Labels {
     this._panel = tool("webmap-labels", "Labels", this._go, this._message, this._sheet);
     this._ending = new AbortController();
     this._listen();
-    this._offs = [
+    this.destroy = endOf(
+      () => claimPresses(map.svg, "labels", false),
+      () => this._close(""),
+      () => this._ending.abort(),
       fitLabels(map),
       lay(map, this._panel, "top-left"),
       devicesOf(map.drive).claimEscape(() => this._leave()),
       map.onSelect(() => this._refresh()),
-    ];
+    );
     this._activate(false);
-  }
-
-  destroy() {
-    claimPresses(this._map.svg, "labels", false);
-    this._close("");
-    this._ending.abort();
-    for (const off of this._offs) off();
   }
 
   /** @param {{done?: boolean, refused?: string}} message */
@@ -106,8 +102,7 @@ class Labels {
     const label = labelOf(event.target);
     if (this._active) {
       event.stopPropagation();
-      const { x, y } = this._map.pointOf(event);
-      this._openNew(unapply(this._map.view, x, y));
+      this._openNew(this._map.worldOf(event));
     } else if (label) {
       event.stopPropagation();
       this._open(label);

@@ -10,6 +10,7 @@ import {
   writeLayout,
 } from "../../web/layout.js";
 import { button, html, setText } from "../../web/tools/elements.js";
+import { endOf } from "../../web/tools/overlay.js";
 import { joinSaveMenu, offer } from "../../web/tools/save_menu.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -50,10 +51,7 @@ export default function attach(map, options, send) {
   const tool = new LayoutTool(map, options, views, send);
   return {
     receive: () => views.restoreAgain(),
-    destroy: () => {
-      tool.destroy();
-      views.destroy();
-    },
+    destroy: endOf(tool, views),
   };
 }
 

@@ -1,6 +1,6 @@
 import { readStored, store } from "../../web/stored.js";
 import { html, onBeat, setHidden, setText, svg } from "../../web/tools/elements.js";
-import { lay } from "../../web/tools/overlay.js";
+import { endOf, lay } from "../../web/tools/overlay.js";
 import { foldedTool } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -80,7 +80,7 @@ class RosoutPanel {
       this._choice.append(html("option", "", { value: each }, words));
     }
     this._choice.value = levels.includes(stored?.least) ? stored.least : level;
-    this._leave = map.layout.add("log", {
+    const leave = map.layout.add("log", {
       read: () => ({ open: this._details.open, least: this._choice.value }),
       write: (log) => this._lay(log.open, log.least),
       reset: () => this._lay(false, level),
@@ -102,16 +102,13 @@ class RosoutPanel {
     this._details.querySelector("summary")?.append(this._badge);
     this._details.open = open;
     this._details.addEventListener("toggle", () => this._toggled());
-    this._off = onBeat(() => this._age(), PERIOD);
-    this._take = lay(map, this._details, "top-left");
+    this.destroy = endOf(
+      onBeat(() => this._age(), PERIOD),
+      leave,
+      lay(map, this._details, "top-left"),
+    );
     this._filter();
     if (open) send({ open: true });
-  }
-
-  destroy() {
-    this._off();
-    this._leave();
-    this._take();
   }
 
   /** @param {any} message */

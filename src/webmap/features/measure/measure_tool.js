@@ -1,7 +1,7 @@
 import { devicesOf } from "../../web/inputs/devices.js";
-import { apply, unapply } from "../../web/view.js";
+import { apply } from "../../web/view.js";
 import { button, html, setText, svg } from "../../web/tools/elements.js";
-import { lay } from "../../web/tools/overlay.js";
+import { endOf, lay } from "../../web/tools/overlay.js";
 import { claimPresses, tool, toolDrawing, toolName } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/view.js').Point} Point */
@@ -57,19 +57,15 @@ class MeasureTool {
     this._drawing = toolDrawing("webmap-measure-drawing", this._path);
     this._ending = new AbortController();
     this._listen();
-    this._offs = [
+    this.destroy = endOf(
+      () => this._activate(false),
+      () => this._ending.abort(),
       lay(map, this._drawing),
       lay(map, panel, "top-left"),
       devicesOf(map.drive).claimEscape(() => this._leave()),
       map.onView(() => this._draw()),
-    ];
+    );
     this._activate(false);
-  }
-
-  destroy() {
-    this._activate(false);
-    this._ending.abort();
-    for (const off of this._offs) off();
   }
 
   _listen() {
@@ -115,7 +111,7 @@ class MeasureTool {
     if (this._pointer !== null) return;
     this._pointer = event.pointerId;
     this._map.svg.setPointerCapture(event.pointerId);
-    const from = this._place(event);
+    const from = this._map.worldOf(event);
     this._line = { from, to: from };
     this._draw();
   }
@@ -125,7 +121,7 @@ class MeasureTool {
     if (!this._active) return;
     event.stopImmediatePropagation();
     if (event.pointerId !== this._pointer || !this._line) return;
-    this._line.to = this._place(event);
+    this._line.to = this._map.worldOf(event);
     this._draw();
   }
 
@@ -135,12 +131,6 @@ class MeasureTool {
     event.stopImmediatePropagation();
     this._map.suppressNextClick();
     this._pointer = null;
-  }
-
-  /** @param {PointerEvent} event */
-  _place(event) {
-    const { x, y } = this._map.pointOf(event);
-    return unapply(this._map.view, x, y);
   }
 
   _draw() {

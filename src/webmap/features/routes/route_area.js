@@ -2,7 +2,7 @@ import { devicesOf } from "../../web/inputs/devices.js";
 import { attentive } from "../../web/inputs/focus.js";
 import { apply } from "../../web/view.js";
 import { button, html, setHidden, svg } from "../../web/tools/elements.js";
-import { lay } from "../../web/tools/overlay.js";
+import { endOf, lay } from "../../web/tools/overlay.js";
 import { MOST_CORNERS, problemOf, withoutRepetitions } from "./polygon.js";
 import { PressAim } from "../../web/tools/aim.js";
 import { toolDrawing } from "../../web/tools/tool.js";
@@ -86,19 +86,17 @@ export class RouteArea {
       done: (pose) => this._press(pose),
       lasting: true,
     });
-    this._ending = new AbortController();
-    const { signal } = this._ending;
+    const ending = new AbortController();
+    const { signal } = ending;
     window.addEventListener("keydown", (event) => this._keyDown(event), { signal });
-    // While corners are pressed the aim handles Escape.
-    this._offEscape = devicesOf(map.drive).claimEscape(() => this._closed && this.leave());
+    this.destroy = endOf(
+      () => ending.abort(),
+      // While corners are pressed the aim handles Escape.
+      devicesOf(map.drive).claimEscape(() => this._closed && this.leave()),
+      this._aim,
+      this._drawing,
+    );
     this._draw();
-  }
-
-  destroy() {
-    this._ending.abort();
-    this._offEscape();
-    this._aim.destroy();
-    this._drawing.destroy();
   }
 
   /** Whether corners are being pressed, or will be after another tool ends. */
@@ -370,12 +368,8 @@ class AreaDrawing {
     this._marks = svg("g", {});
     const classes = "webmap-route-drawing webmap-area-drawing";
     this._drawing = toolDrawing(classes, this._world, this._marks);
-    this._offs = [lay(map, this._drawing), map.onView(() => this._place())];
+    this.destroy = endOf(lay(map, this._drawing), map.onView(() => this._place()));
     this._place();
-  }
-
-  destroy() {
-    for (const off of this._offs) off();
   }
 
   /**

@@ -1,7 +1,7 @@
 import { LONGEST_NAME } from "../../web/constants.js";
 import { onScreen } from "../../web/tools/aim.js";
 import { button, html, setAttribute, setHidden, setText, svg } from "../../web/tools/elements.js";
-import { lay } from "../../web/tools/overlay.js";
+import { endOf, lay } from "../../web/tools/overlay.js";
 import { toolDrawing } from "../../web/tools/tool.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
@@ -29,11 +29,7 @@ export class RoutePoints {
     this._line = svg("polyline", { class: "webmap-route-line webmap-line" });
     this._group = svg("g", {});
     this._drawing = toolDrawing("webmap-route-drawing", this._line, this._group);
-    this._offs = [lay(map, this._drawing), map.onView(() => this._place())];
-  }
-
-  destroy() {
-    for (const off of this._offs) off();
+    this.destroy = endOf(lay(map, this._drawing), map.onView(() => this._place()));
   }
 
   /**
@@ -81,8 +77,7 @@ export class RoutePoints {
     const ending = new AbortController();
     const { signal } = ending;
     const move = (/** @type {PointerEvent} */ event) => {
-      const { x, y } = this._map.pointOf(event);
-      this._moved(index, { ...this._points[index], ...this._map.toWorld(x, y) });
+      this._moved(index, { ...this._points[index], ...this._map.worldOf(event) });
     };
     point.addEventListener("pointermove", move, { signal });
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) {

@@ -8,7 +8,7 @@ import {
   stopButton,
   svg,
 } from "../../web/tools/elements.js";
-import { lay, ownPlace } from "../../web/tools/overlay.js";
+import { endOf, lay, ownPlace } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
@@ -41,10 +41,7 @@ export default function attach(map, options, send) {
   const bar = new SeveralBar(map, options, send);
   return {
     receive: ({ problem }) => bar.showProblem(problem),
-    destroy() {
-      box.destroy();
-      bar.destroy();
-    },
+    destroy: endOf(box, bar),
   };
 }
 
@@ -78,23 +75,21 @@ class SeveralBar {
       button("webmap-several-clear", "Clear", () => send({ clear: true })),
       this._problem,
     );
-    this._take = lay(map, this._panel, "bottom-right");
-    this._ending = new AbortController();
+    const ending = new AbortController();
     const act = () => {
       const robots = [...document.querySelectorAll(rows)].map((row) =>
         row.getAttribute("data-robot"),
       );
       send({ mark: robots.filter((robot) => robot !== null) });
     };
-    ownPlace(own)?.addEventListener("click", act, { signal: this._ending.signal });
-    this._offs = [onBeat(() => this._show()), map.onSelect(() => this.showProblem(""))];
+    ownPlace(own)?.addEventListener("click", act, { signal: ending.signal });
+    this.destroy = endOf(
+      onBeat(() => this._show()),
+      map.onSelect(() => this.showProblem("")),
+      () => ending.abort(),
+      lay(map, this._panel, "bottom-right"),
+    );
     this._show();
-  }
-
-  destroy() {
-    for (const off of this._offs) off();
-    this._ending.abort();
-    this._take();
   }
 
   /** @param {string} text */

@@ -89,12 +89,8 @@ class ShiftPanel {
     this._details.querySelector("summary")?.append(this._badge);
     this._details.open = kept.open;
     this._details.addEventListener("toggle", show);
-    this._take = lay(map, this._details, "top-left");
+    this.destroy = lay(map, this._details, "top-left");
     if (kept.open) send({ show: chosen() });
-  }
-
-  destroy() {
-    this._take();
   }
 
   /** @param {any} message */

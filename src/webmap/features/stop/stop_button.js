@@ -12,7 +12,7 @@ import {
   stopButton,
   TwiceButton,
 } from "../../web/tools/elements.js";
-import { lay } from "../../web/tools/overlay.js";
+import { endOf, lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/drive.js').Drive} Drive */
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
@@ -95,7 +95,7 @@ class Stop {
     );
     this._shown = "";
     const drive = this._drive;
-    this._offs = [
+    this.destroy = endOf(
       lay(map, panel, "top-right", place),
       devicesOf(drive).open(),
       drive.on("stop", () => this._stopped()),
@@ -109,13 +109,9 @@ class Stop {
         if (what === "reset" && robot !== null) this._refused.set(robot, why);
       }),
       drive.on("step", () => this._show()),
-    ];
-  }
-
-  destroy() {
-    for (const off of this._offs) off();
-    this._alarm.destroy();
-    document.body.classList.remove("webmap-results");
+      this._alarm,
+      () => document.body.classList.remove("webmap-results"),
+    );
   }
 
   /** @param {import('../../web/motion/report.js').RobotReport} report */

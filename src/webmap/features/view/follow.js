@@ -1,5 +1,5 @@
 import { button, setAttribute } from "../../web/tools/elements.js";
-import { lay } from "../../web/tools/overlay.js";
+import { endOf, lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
@@ -27,15 +27,11 @@ export default function attach(map, _options, send) {
   /** @type {import('../../web/drive.js').Drive} */
   const drive = map.drive;
   // The view sends no event when following begins; its state is read instead.
-  const offs = [
+  const destroy = endOf(
     lay(map, toggle, "bottom-right"),
     map.onSelect(show),
     drive.on("step", show),
-  ];
+  );
   show();
-  return {
-    destroy() {
-      for (const off of offs) off();
-    },
-  };
+  return { destroy };
 }

@@ -1,5 +1,6 @@
 import { scaleOf } from "../../web/view.js";
 import { svg } from "../../web/tools/elements.js";
+import { endOf } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
@@ -53,12 +54,6 @@ export default function attach(map, { least = 32 }) {
     lines.setAttribute("d", `M0 ${step}V0H${step}`);
     lines.setAttribute("stroke-width", `${2 / scale}`);
   };
-  const off = map.onView(show);
   show();
-  return {
-    destroy() {
-      off();
-      element.remove();
-    },
-  };
+  return { destroy: endOf(map.onView(show), () => element.remove()) };
 }

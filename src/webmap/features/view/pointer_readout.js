@@ -1,5 +1,5 @@
 import { html, setHidden, setText } from "../../web/tools/elements.js";
-import { lay } from "../../web/tools/overlay.js";
+import { endOf, lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
@@ -41,14 +41,7 @@ export default function attach(map, { digits = 2 }) {
   };
   map.svg.addEventListener("pointermove", move, { signal });
   map.svg.addEventListener("pointerleave", leave, { signal });
-  const off = map.onView(show);
-  return {
-    destroy() {
-      ending.abort();
-      off();
-      take();
-    },
-  };
+  return { destroy: endOf(() => ending.abort(), map.onView(show), take) };
 }
 
 /**

@@ -1,6 +1,6 @@
 import { scaleOf } from "../../web/view.js";
 import { html, setHidden, svg } from "../../web/tools/elements.js";
-import { lay } from "../../web/tools/overlay.js";
+import { endOf, lay } from "../../web/tools/overlay.js";
 
 /** @typedef {import('../../web/map.js').MapCanvas} MapCanvas */
 /** @typedef {import('../../web/browser_parts.js').BrowserPart} BrowserPart */
@@ -62,14 +62,8 @@ export default function attach(map, { width = 120 }) {
     line.setAttribute("d", `M${end - length * scale} 1v6H${end}v-6`);
     text.textContent = lengthText(length);
   };
-  const off = map.onView(show);
   show();
-  return {
-    destroy() {
-      off();
-      take();
-    },
-  };
+  return { destroy: endOf(map.onView(show), take) };
 }
 
 /** @param {number} value */

@@ -48,7 +48,7 @@ const KEY_MOVE = 10;
 const KEY_TURN = Math.PI / 12;
 
 /** @type {Record<string, [number, number]>} Right and down on the screen. */
-const ARROWS = {
+export const ARROWS = {
   ArrowRight: [1, 0],
   ArrowLeft: [-1, 0],
   ArrowDown: [0, 1],
@@ -270,8 +270,7 @@ export class PressAim {
     event.stopImmediatePropagation();
     if (event.pointerId === this._press?.id) this._preview(event);
     else if (!this._press && event.pointerType === "mouse" && this._aims.hover) {
-      const { x, y } = this._map.pointOf(event);
-      this._aims.hover(unapply(this._map.view, x, y));
+      this._aims.hover(this._map.worldOf(event));
     }
   }
 

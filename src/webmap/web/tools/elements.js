@@ -1,7 +1,5 @@
 /** Elements of pages: how they are made, changed and pressed. */
 
-/** @typedef {import('../map.js').MapCanvas} MapCanvas */
-
 /**
  * Make an HTML element.
  *
@@ -15,11 +13,7 @@
 export function html(tag, className, attributes = {}, ...children) {
   const element = document.createElement(tag);
   element.className = className;
-  for (const [name, value] of Object.entries(attributes)) {
-    element.setAttribute(name, value);
-  }
-  element.append(...children);
-  return element;
+  return filled(element, attributes, children);
 }
 
 /**
@@ -32,7 +26,16 @@ export function html(tag, className, attributes = {}, ...children) {
  * @returns {SVGElementTagNameMap[K]}
  */
 export function svg(tag, attributes, ...children) {
-  const element = document.createElementNS("http://www.w3.org/2000/svg", tag);
+  return filled(document.createElementNS("http://www.w3.org/2000/svg", tag), attributes, children);
+}
+
+/**
+ * @template {Element} E
+ * @param {E} element
+ * @param {Record<string, string>} attributes
+ * @param {(Node | string)[]} children
+ */
+function filled(element, attributes, children) {
   for (const [name, value] of Object.entries(attributes)) {
     element.setAttribute(name, value);
   }
@@ -341,43 +344,6 @@ export function byId(id) {
 /** @param {KeyboardEvent} event */
 export function typing({ target }) {
   return target instanceof Element && target.matches("input, textarea, select");
-}
-
-/**
- * Open and close the sheet on a narrow screen.
- *
- * @param {AbortSignal} signal
- */
-export function listenToSheet(signal) {
-  const handle = byId("sheet");
-  const turn = () => {
-    const open = handle.getAttribute("aria-expanded") === "true";
-    handle.setAttribute("aria-expanded", `${!open}`);
-  };
-  handle.addEventListener("click", turn, { signal });
-}
-
-/**
- * Show the selected robots on the sheet's handle, for a closed sheet.
- *
- * @param {MapCanvas} map
- */
-export function nameSheet(map) {
-  const text = byId("sheet-text");
-  const show = () => {
-    const row = `#robots [data-robot="${map.selected}"]`;
-    const name = document.querySelector(`${row} .name`)?.textContent;
-    const states = [...document.querySelectorAll(`${row} .state > *`)]
-      .filter((one) => getComputedStyle(one).display !== "none")
-      .map((one) => one.textContent?.replace(/^ \u00b7 /, ""));
-    const count = byId("robots-count").textContent ?? "";
-    setText(text, name ? `${name}: ${states.join(" \u00b7 ")}` : count);
-  };
-  show();
-  const offs = [onBeat(show, 2), map.onSelect(show)];
-  return () => {
-    for (const off of offs) off();
-  };
 }
 
 /** Close the sheet, if it covers the map. */

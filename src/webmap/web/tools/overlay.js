@@ -39,6 +39,21 @@ export function lay(map, panel, corner, place = "") {
   };
 }
 
+/**
+ * Make the function that ends several things, such as the elements of {@link lay}.
+ *
+ * @param {...((() => unknown) | {destroy: () => void})} parts
+ * @returns {() => void} Ends them, in this order.
+ */
+export function endOf(...parts) {
+  return () => {
+    for (const part of parts) {
+      if (typeof part === "function") part();
+      else part.destroy();
+    }
+  };
+}
+
 /** @type {Set<Element>} The page's own elements with panels that are not in order yet. */
 const unsorted = new Set();
 

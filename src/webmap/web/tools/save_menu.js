@@ -1,6 +1,6 @@
 import { devicesOf } from "../inputs/devices.js";
 import { html, setHidden, setText, svg } from "./elements.js";
-import { lay, ownPlace } from "./overlay.js";
+import { endOf, lay, ownPlace } from "./overlay.js";
 
 /** @typedef {import('../map.js').MapCanvas} MapCanvas */
 
@@ -72,8 +72,8 @@ class SaveMenu {
     this._menu = html("div", "webmap-panel webmap-export-menu");
     this._message = html("span", "webmap-export-word", { role: "status" });
     this._element = html("div", "webmap-export", {}, this._go, this._menu, this._message);
-    this._ending = new AbortController();
-    const { signal } = this._ending;
+    const ending = new AbortController();
+    const { signal } = ending;
     const outside = (/** @type {Event} */ event) => {
       if (event.target instanceof Node && !this._element.contains(event.target)) {
         this._open(false);
@@ -86,16 +86,12 @@ class SaveMenu {
       if (event.key === "Escape") this._leave();
     };
     this._element.addEventListener("keydown", escape, { signal });
-    this._offs = [
+    this.destroy = endOf(
+      () => ending.abort(),
       this._lay(place),
       devicesOf(map.drive).claimEscape(() => this._leave()),
-    ];
+    );
     this._open(false);
-  }
-
-  destroy() {
-    this._ending.abort();
-    for (const off of this._offs) off();
   }
 
   get empty() {
