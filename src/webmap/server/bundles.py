@@ -199,11 +199,12 @@ def _bundle(bundle: str, sources: Mapping[str, str], before: str) -> tuple[str, 
 
 
 def _in_page(text: str) -> str:
-    """Return a bundle as a script that is not a module."""
+    """Return a bundle as a script that is not a module, and removes its element."""
     lines = text.split("\n")
     kept = [line for line in lines if line and not line.startswith(("//", "export "))]
     here = "new URL(document.currentScript.dataset.from, location.href)"
-    return "{\n" + "\n".join(kept).replace("import.meta.url", here) + "\n}\n"
+    text = "\n".join(kept).replace("import.meta.url", here)
+    return "{\n" + text + "\ndocument.currentScript.remove();\n}\n"
 
 
 def _imports(name: str, source: str) -> list[str]:
