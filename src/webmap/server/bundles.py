@@ -265,6 +265,7 @@ def served_sheets(
 
     """
     mark = "\0"  # where the shared sheet is imported
+    within: set[str] = set()  # the sheets that others import
 
     def rules(name: str) -> str:
         """Return the rules of a sheet and of those that it imports."""
@@ -272,6 +273,7 @@ def served_sheets(
         if found is None or "@import" in found[2]:
             raise ValueError(f"{name} has an import of another form or after rules")
         needed = [_beside(name, one) for one in re.findall('"(.+)"', found[1])]
+        within.update(needed)
         return "".join(mark if n == shared else rules(n) for n in needed) + found[2]
 
     texts = {name: rules(name) for name in sources}
@@ -279,7 +281,7 @@ def served_sheets(
     others = [name for name in texts if name.startswith(_SHEET_FOLDERS)]
     for bundle, names in (
         (FIRST_SHEETS, first),
-        (PART_SHEETS, [name for name in others if name not in first]),
+        (PART_SHEETS, [name for name in others if name not in {*first, *within}]),
     ):
         texts[bundle] = "".join(texts.get(name, "") for name in names)
     for name, text in texts.items():
