@@ -180,6 +180,22 @@ def test_another_domain_is_named_where_there_is_no_node():
     run(scenario)
 
 
+def test_robots_in_two_domains_of_one_router_are_read():
+    async def scenario():
+        with (
+            router() as port,
+            rmw_zenoh_robot(port) as robot,
+            rmw_zenoh_robot(port, domain=42) as other,
+        ):
+            expected = await until_listed(robot)
+            assert await until_listed(other) == expected
+            for path in ("", "/42") * 5:
+                url = f"zenoh-ros2://127.0.0.1:{port}{path}"
+                assert await ask_topics(url, wait=5.0) == expected
+
+    run(scenario)
+
+
 def test_types_that_cannot_be_read_are_refused_once_in_words(caplog):
     async def scenario():
         strange = "RIHS01_" + "ab" * 32

@@ -165,20 +165,19 @@ class RouterConnection(BridgeConnection):
                 f"{mine}**", Callback(changed, indirect=False), history=True
             )
             replies = session.liveliness().get(f"{ROOT}/**", channel, timeout=PATIENCE)
+            # The router does not repeat tokens that it has sent to the subscriber.
             tokens = [str(each.ok.key_expr) for each in replies if each.ok is not None]
         except zenoh.ZError as error:  # it was closed just now
             why = one_line(error)
             raise BridgeClosed(f"{self.url}: {why}", why) from None
-        found = [token for token in tokens if token.startswith(mine)]
-        if tokens and not found:
-            others = sorted({token.split("/")[1] for token in tokens})
+        others = sorted({token.split("/")[1] for token in tokens})
+        if others and str(self._domain) not in others and not changes:
             why = (
                 f"there is no node in the domain {self._domain}, but in "
                 f"{one_line(', '.join(others))}: the robot's domain belongs at the end "
                 "of the address, after a /"
             )
             raise BridgeClosed(f"{self.url}: {why}", why)
-        changes.extendleft([change_of(token, came=True) for token in found])
         return changes
 
     async def _serve_topics(
