@@ -90,6 +90,9 @@ def test_a_namespace_and_transient_local_are_read():
         TALKER.replace("%chatter", "%%chatter"),
         TALKER.replace("%chatter", "%" + "long" * 100),
         TALKER.replace(STRING, "long" * 1000),
+        TALKER.replace(STRING, "*"),
+        TALKER.replace("/0/", "/*/", 1),
+        TALKER.replace("/talker/", "/tal$*/"),
         TALKER.replace("String_", "long" * 1000 + "_"),
     ],
 )

@@ -99,7 +99,8 @@ def read_token(token: str) -> Endpoint | None:
 
     """
     parts = token.split("/")
-    kind = parts[5] if len(parts) > 5 and parts[0] == ROOT else ""
+    is_one = len(parts) > 5 and parts[0] == ROOT and "*" not in token
+    kind = parts[5] if is_one else ""
     if kind in _OTHER_KINDS:
         return None
     if kind in _KINDS and len(parts) >= _PARTS and len(token) <= MOST_TOKEN:
@@ -177,12 +178,11 @@ class Offer:
         return any(e.latched and e.publishes and e.source == source for e in every)
 
     def apply(self, changes: deque[Change]) -> Iterator[bytes]:
-        """Take changes, which are removed, and return the frames for them."""
+        """Remove the changes that came so far, and return the frames for them."""
         if not changes:
             return
         faults: dict[str, None] = {}
-        while changes:
-            token, found = changes.popleft()
+        for token, found in [changes.popleft() for _ in range(len(changes))]:
             if isinstance(found, ProtocolError):
                 faults[str(found)] = None
             elif found is None:
