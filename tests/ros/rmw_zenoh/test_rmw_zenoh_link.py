@@ -135,6 +135,27 @@ def test_every_message_that_a_latched_topic_has_kept_arrives():
     run(scenario)
 
 
+def test_kept_messages_of_a_publisher_that_is_announced_late_arrive():
+    """Subscribers come first, as after a restart of the router."""
+
+    async def scenario():
+        with router() as port, rmw_zenoh_robot(port, topics={}) as robot:
+            topic, type = "/tf_static", "tf2_msgs/TFMessage"
+            robot.undeclare(robot.add(topic, type, latched=True))
+            robot.publish(topic, robot.robot.frames())
+            robot.announce("MS", topic, type)
+            async with watched(port) as bridge:
+                got = []
+                bridge.subscribe(topic, got.append, type)
+                await until(lambda: bridge._graph.known(topic))
+                await asyncio.sleep(0.5)
+                assert not got
+                robot.announce("MP", topic, type, latched=True)
+                await until(lambda: got)
+
+    run(scenario)
+
+
 def test_nothing_is_published_or_called_and_the_robot_cannot_be_driven(caplog):
     async def scenario():
         with router() as port, rmw_zenoh_robot(port) as robot:

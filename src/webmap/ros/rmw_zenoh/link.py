@@ -228,7 +228,7 @@ class RouterConnection(BridgeConnection):
         handler = Callback(reader.came, indirect=False)
         key = f"{self._domain}/{source.key}"
         try:
-            if self._offer.is_latched(source):
+            if source.latched:
                 kept = ext.HistoryConfig(detect_late_publishers=True)
                 reader.subscriber = ext.declare_advanced_subscriber(
                     self._session, key, handler, history=kept

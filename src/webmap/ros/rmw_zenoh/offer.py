@@ -75,6 +75,9 @@ class Source(NamedTuple):
     key: str
     """The part of the key of the messages after the domain."""
 
+    latched: bool = False
+    """Whether one of the publishers keeps its last messages for late subscribers."""
+
 
 class Endpoint(NamedTuple):
     """A publisher or a subscriber of one node."""
@@ -172,11 +175,6 @@ class Offer:
         found = (e for e in every if (e.source.topic, e.publishes) == (topic, publish))
         return sorted({each.node for each in found})
 
-    def is_latched(self, source: Source) -> bool:
-        """Return whether a publisher keeps its last messages for late subscribers."""
-        every = self._endpoints.values()
-        return any(e.latched and e.publishes and e.source == source for e in every)
-
     def apply(self, changes: deque[Change]) -> Iterator[bytes]:
         """Remove the changes that came so far, and return the frames for them."""
         if not changes:
@@ -197,8 +195,9 @@ class Offer:
     def _changed_channels(self) -> Iterator[bytes]:
         every = self._endpoints.values()
         published = {each.source.topic for each in every if each.publishes}
+        kept = {each.source for each in every if each.publishes and each.latched}
         now = {
-            each.source: None
+            each.source._replace(latched=each.source in kept): None
             for each in every
             if each.publishes or each.source.topic not in published
         }
