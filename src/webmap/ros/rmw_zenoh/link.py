@@ -92,7 +92,7 @@ async def session_with(url: str) -> AsyncIterator[zenoh.Session]:
         session = await asyncio.shield(opening)
     except zenoh.ZError:
         why = await asyncio.to_thread(why_not_reached, locator) or (
-            "what listens there is no Zenoh router, or lets nobody in without a user"
+            "it is not a Zenoh router, or it lets nobody in without a user"
         )
         text = f"cannot reach the Zenoh router at {url}: {why}"
         raise BridgeClosed(text, why) from None
@@ -174,8 +174,8 @@ class RouterConnection(BridgeConnection):
         if others and str(self._domain) not in others and not changes:
             why = (
                 f"there is no node in the domain {self._domain}, but in "
-                f"{one_line(', '.join(others))}: the robot's domain belongs at the end "
-                "of the address, after a /"
+                f"{one_line(', '.join(others))}: add the robot's domain at the end of "
+                f"the address, such as {SCHEME}://robot/42"
             )
             raise BridgeClosed(f"{self.url}: {why}", why)
         return changes

@@ -151,8 +151,8 @@ def message_frame(
     if len(attachment) != _ATTACHMENT or attachment[16] != 16:
         return remark(
             f"{topic}: got a message with an attachment of {len(attachment)} bytes, "
-            f"expected {_ATTACHMENT} as of rmw_zenoh of ROS 2 Kilted: the sender is "
-            "another program or an older rmw_zenoh"
+            f"expected {_ATTACHMENT}, as rmw_zenoh of ROS 2 Kilted sends: the sender "
+            "is another program or an older rmw_zenoh"
         )
     kept = (
         b"" if len(payload) == size else SHORTENED + (size + PAYLOAD).to_bytes(8, "big")
