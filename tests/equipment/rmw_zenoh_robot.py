@@ -109,9 +109,10 @@ class RmwZenohRobot:
         return f"{package}::{kind}::dds_::{name}_", hash or self.hash_of(type)
 
     def add(self, topic, type, *, hash=None, latched=False, all=False, node="robot"):
-        """Make a publisher with its token; ``all`` is reliable with a KEEP_ALL history.
+        """Make a publisher, and return its token.
 
-        Any other one drops messages while the connection is busy.
+        It is reliable with a KEEP_ALL history for ``all``. Any other one drops messages
+        while the connection is busy.
         """
         key = "/".join((str(self.domain), topic[1:], *self._names(type, hash)))
         kept = {"cache": ext.CacheConfig(1)} if latched else {}
@@ -123,7 +124,7 @@ class RmwZenohRobot:
             publisher_detection=latched,
             **kept,
         )
-        self.announce("MP", topic, type, hash=hash, latched=latched, node=node)
+        return self.announce("MP", topic, type, hash=hash, latched=latched, node=node)
 
     def publish(self, topic, data, attachment=None):
         """Publish bytes; with the attachment of rmw_zenoh if none is given."""

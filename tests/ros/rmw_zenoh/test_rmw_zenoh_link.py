@@ -135,6 +135,27 @@ def test_every_message_that_a_latched_topic_has_kept_arrives():
     run(scenario)
 
 
+def test_kept_messages_of_a_publisher_that_is_announced_late_arrive():
+    """Subscribers come first, as after a restart of the router."""
+
+    async def scenario():
+        with router() as port, rmw_zenoh_robot(port, topics={}) as robot:
+            topic, type = "/tf_static", "tf2_msgs/TFMessage"
+            robot.undeclare(robot.add(topic, type, latched=True))
+            robot.publish(topic, robot.robot.frames())
+            robot.announce("MS", topic, type)
+            async with watched(port) as bridge:
+                got = []
+                bridge.subscribe(topic, got.append, type)
+                await until(lambda: bridge._graph.known(topic))
+                await asyncio.sleep(0.5)
+                assert not got
+                robot.announce("MP", topic, type, latched=True)
+                await until(lambda: got)
+
+    run(scenario)
+
+
 def test_nothing_is_published_or_called_and_the_robot_cannot_be_driven(caplog):
     async def scenario():
         with router() as port, rmw_zenoh_robot(port) as robot:
@@ -171,11 +192,29 @@ def test_another_domain_is_named_where_there_is_no_node():
             async with TemporaryBridge(robot.url) as bridge:
                 with pytest.raises(BridgeClosed, match="in the domain 0, but in 42"):
                     await bridge.topics()
-                with pytest.raises(BridgeClosed, match="belongs at the end of the"):
+                with pytest.raises(
+                    BridgeClosed, match="add the robot's domain at the end"
+                ):
                     await bridge.open()
                 assert "in the domain 0, but in 42" in bridge.trouble
             async with watched(port, "/42") as bridge:
                 await until(lambda: bridge._graph.known("/odom"))
+
+    run(scenario)
+
+
+def test_robots_in_two_domains_of_one_router_are_read():
+    async def scenario():
+        with (
+            router() as port,
+            rmw_zenoh_robot(port) as robot,
+            rmw_zenoh_robot(port, domain=42) as other,
+        ):
+            expected = await until_listed(robot)
+            assert await until_listed(other) == expected
+            for path in ("", "/42") * 5:
+                url = f"zenoh-ros2://127.0.0.1:{port}{path}"
+                assert await ask_topics(url, wait=5.0) == expected
 
     run(scenario)
 
@@ -209,7 +248,7 @@ def test_types_that_cannot_be_read_are_refused_once_in_words(caplog):
                 assert "the definition of sensor_msgs/Imu is not included" in text
                 assert "my_msgs/Dock is not included" in text
                 assert f"the hash is {strange}, expected RIHS01_3cc97dc7" in text
-                assert "as rmw_zenoh of ROS 2 Humble" in text
+                assert "like rmw_zenoh of ROS 2 Humble" in text
                 assert len(bridge.errors) == 4
                 lines = [
                     r for r in caplog.records if "cannot be used" in r.getMessage()
@@ -434,7 +473,7 @@ def test_what_is_no_router_is_named():
         server = await asyncio.start_server(lambda _, w: w.close(), "127.0.0.1", 0)
         port = server.sockets[0].getsockname()[1]
         async with server, TemporaryBridge(f"zenoh-ros2://127.0.0.1:{port}") as bridge:
-            with pytest.raises(BridgeClosed, match="no Zenoh router"):
+            with pytest.raises(BridgeClosed, match="not a Zenoh router"):
                 await bridge.topics()
         async with TemporaryBridge(f"zenoh-ros2://127.0.0.1:{port}") as bridge:
             with pytest.raises(BridgeClosed, match="refused") as refused:

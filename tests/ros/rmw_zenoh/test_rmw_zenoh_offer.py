@@ -90,6 +90,9 @@ def test_a_namespace_and_transient_local_are_read():
         TALKER.replace("%chatter", "%%chatter"),
         TALKER.replace("%chatter", "%" + "long" * 100),
         TALKER.replace(STRING, "long" * 1000),
+        TALKER.replace(STRING, "*"),
+        TALKER.replace("/0/", "/*/", 1),
+        TALKER.replace("/talker/", "/tal$*/"),
         TALKER.replace("String_", "long" * 1000 + "_"),
     ],
 )
@@ -156,13 +159,16 @@ def test_subscribers_announce_a_topic_until_it_has_a_publisher():
     assert changed(offer, gone=[odometry(2)])[0] == ["/odom"]
 
 
-def test_only_a_publisher_makes_a_topic_latched():
+def test_a_publisher_that_keeps_messages_makes_another_channel():
     offer = Offer()
     changed(offer, [odometry(1), odometry(2, "MS", quality="1")])
+    ((plain, source),) = offer.channels.items()
+    assert not source.latched
+    latched = odometry(3, quality="1")
+    assert changed(offer, [latched]) == (["/odom"], [plain])
     (source,) = offer.channels.values()
-    assert not offer.is_latched(source)
-    assert changed(offer, [odometry(3, quality="1")]) == ([], [])
-    assert offer.is_latched(source)
+    assert source.latched
+    assert changed(offer, [odometry(4), odometry(5, quality="1")]) == ([], [])
 
 
 def test_remarks_about_lying_tokens_are_few():

@@ -92,7 +92,7 @@ async def session_with(url: str) -> AsyncIterator[zenoh.Session]:
         session = await asyncio.shield(opening)
     except zenoh.ZError:
         why = await asyncio.to_thread(why_not_reached, locator) or (
-            "what listens there is no Zenoh router, or lets nobody in without a user"
+            "it is not a Zenoh router, or it lets nobody in without a user"
         )
         text = f"cannot reach the Zenoh router at {url}: {why}"
         raise BridgeClosed(text, why) from None
@@ -165,20 +165,19 @@ class RouterConnection(BridgeConnection):
                 f"{mine}**", Callback(changed, indirect=False), history=True
             )
             replies = session.liveliness().get(f"{ROOT}/**", channel, timeout=PATIENCE)
+            # The router does not repeat tokens that it has sent to the subscriber.
             tokens = [str(each.ok.key_expr) for each in replies if each.ok is not None]
         except zenoh.ZError as error:  # it was closed just now
             why = one_line(error)
             raise BridgeClosed(f"{self.url}: {why}", why) from None
-        found = [token for token in tokens if token.startswith(mine)]
-        if tokens and not found:
-            others = sorted({token.split("/")[1] for token in tokens})
+        others = sorted({token.split("/")[1] for token in tokens})
+        if others and str(self._domain) not in others and not changes:
             why = (
                 f"there is no node in the domain {self._domain}, but in "
-                f"{one_line(', '.join(others))}: the robot's domain belongs at the end "
-                "of the address, after a /"
+                f"{one_line(', '.join(others))}: add the robot's domain at the end of "
+                f"the address, such as {SCHEME}://robot/42"
             )
             raise BridgeClosed(f"{self.url}: {why}", why)
-        changes.extendleft([change_of(token, came=True) for token in found])
         return changes
 
     async def _serve_topics(
@@ -229,7 +228,7 @@ class RouterConnection(BridgeConnection):
         handler = Callback(reader.came, indirect=False)
         key = f"{self._domain}/{source.key}"
         try:
-            if self._offer.is_latched(source):
+            if source.latched:
                 kept = ext.HistoryConfig(detect_late_publishers=True)
                 reader.subscriber = ext.declare_advanced_subscriber(
                     self._session, key, handler, history=kept

@@ -75,6 +75,9 @@ class Source(NamedTuple):
     key: str
     """The part of the key of the messages after the domain."""
 
+    latched: bool = False
+    """Whether one of the publishers keeps its last messages for late subscribers."""
+
 
 class Endpoint(NamedTuple):
     """A publisher or a subscriber of one node."""
@@ -99,7 +102,8 @@ def read_token(token: str) -> Endpoint | None:
 
     """
     parts = token.split("/")
-    kind = parts[5] if len(parts) > 5 and parts[0] == ROOT else ""
+    is_one = len(parts) > 5 and parts[0] == ROOT and "*" not in token
+    kind = parts[5] if is_one else ""
     if kind in _OTHER_KINDS:
         return None
     if kind in _KINDS and len(parts) >= _PARTS and len(token) <= MOST_TOKEN:
@@ -147,8 +151,8 @@ def message_frame(
     if len(attachment) != _ATTACHMENT or attachment[16] != 16:
         return remark(
             f"{topic}: got a message with an attachment of {len(attachment)} bytes, "
-            f"expected {_ATTACHMENT} as of rmw_zenoh of ROS 2 Kilted: the sender is "
-            "another program or an older rmw_zenoh"
+            f"expected {_ATTACHMENT}, as rmw_zenoh of ROS 2 Kilted sends: the sender "
+            "is another program or an older rmw_zenoh"
         )
     kept = (
         b"" if len(payload) == size else SHORTENED + (size + PAYLOAD).to_bytes(8, "big")
@@ -171,18 +175,12 @@ class Offer:
         found = (e for e in every if (e.source.topic, e.publishes) == (topic, publish))
         return sorted({each.node for each in found})
 
-    def is_latched(self, source: Source) -> bool:
-        """Return whether a publisher keeps its last messages for late subscribers."""
-        every = self._endpoints.values()
-        return any(e.latched and e.publishes and e.source == source for e in every)
-
     def apply(self, changes: deque[Change]) -> Iterator[bytes]:
-        """Take changes, which are removed, and return the frames for them."""
+        """Remove the changes that came so far, and return the frames for them."""
         if not changes:
             return
         faults: dict[str, None] = {}
-        while changes:
-            token, found = changes.popleft()
+        for token, found in [changes.popleft() for _ in range(len(changes))]:
             if isinstance(found, ProtocolError):
                 faults[str(found)] = None
             elif found is None:
@@ -197,8 +195,9 @@ class Offer:
     def _changed_channels(self) -> Iterator[bytes]:
         every = self._endpoints.values()
         published = {each.source.topic for each in every if each.publishes}
+        kept = {each.source for each in every if each.publishes and each.latched}
         now = {
-            each.source: None
+            each.source._replace(latched=each.source in kept): None
             for each in every
             if each.publishes or each.source.topic not in published
         }

@@ -88,7 +88,7 @@ def check_hash(type: str, hash: str) -> None:
     """
     if hash == NO_HASH:
         raise ConfigError(
-            "the robot sends no hash of its types, as rmw_zenoh of ROS 2 Humble; "
+            "the robot sends no hashes of its types, like rmw_zenoh of ROS 2 Humble; "
             "WebMap reads rmw_zenoh of ROS 2 Kilted and later"
         )
     try:
@@ -99,6 +99,6 @@ def check_hash(type: str, hash: str) -> None:
         ) from None
     if mine != hash:
         raise ConfigError(
-            f"the robot's definition of {type} is another one than WebMap's: the hash "
-            f"is {one_line(hash, 100)}, expected {mine}"
+            f"the robot's definition of {type} differs from WebMap's: the hash is "
+            f"{one_line(hash, 100)}, expected {mine}"
         )
