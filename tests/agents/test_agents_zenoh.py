@@ -1,6 +1,7 @@
 """Peers and a real router: users, rules, TLS and lost connections."""
 
 import socket
+import threading
 import time
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -370,6 +371,27 @@ def test_a_closed_peer_leaves_no_thread_inside_zenoh():
         time.sleep(0.3)
         peer.close()
     assert not any(thread.is_alive() for thread in peer._threads)
+
+
+def test_a_peer_is_closed_when_the_functions_that_it_calls_have_ended():
+    called = threading.Event()
+
+    def take(*_):
+        called.set()
+        time.sleep(0.5)
+
+    before = set(threading.enumerate())
+    with router() as place:
+        peer = Peer(place, RouterUser())
+        peer.start()
+        wait_for(lambda: peer.connected)
+        peer.unlisten(peer.listen("webmap/b/here", take))
+        peer.listen("webmap/a/here", take)
+        peer.answer("webmap/a/about", lambda: b"robots")
+        peer.put_data("webmap/a/here", b"x")
+        assert called.wait(10)
+        peer.close()
+        assert set(threading.enumerate()) <= before
 
 
 def test_an_agent_hears_only_from_the_router_what_it_may_send(users):

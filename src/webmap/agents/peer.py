@@ -12,6 +12,7 @@ import logging
 import threading
 from collections import OrderedDict, deque
 from collections.abc import Callable
+from concurrent.futures import Future
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +29,7 @@ from webmap.base.zenoh_sessions import (
 
 if TYPE_CHECKING:
     import zenoh
+    from zenoh.handlers import Callback
 
 log = logging.getLogger("webmap.agent")
 
@@ -104,6 +106,8 @@ class Peer:
         self._wake = threading.Condition()
         self._putting = threading.Lock()
         self._threads: list[threading.Thread] = []
+        self._receivers: list[Future[threading.Thread]] = []
+        """The threads in which Zenoh calls a function, known when they end."""
 
     @property
     def connected(self) -> bool:
@@ -139,6 +143,9 @@ class Peer:
                 session.close()  # type: ignore[no-untyped-call]
         if sending is not None:
             sending.join(OPENING)  # a closed session sends nothing
+        for receiver in self._receivers:
+            with suppress(TimeoutError):
+                receiver.result(OPENING).join(OPENING)
 
     def listen(
         self,
@@ -361,7 +368,8 @@ class Peer:
                 (session, f"{key}/{copy}") for copy, session in enumerate(self._gate)
             ]
         self._declared[number] = [
-            session.declare_subscriber(place, call) for session, place in places
+            session.declare_subscriber(place, self._receiver(call))
+            for session, place in places
         ]
 
     def _declare_answer(self, key: str) -> None:
@@ -373,7 +381,16 @@ class Peer:
                     log.exception("%s: a question was not answered", key)
 
         assert self._data is not None
-        self._data.declare_queryable(key, call)
+        self._data.declare_queryable(key, self._receiver(call))
+
+    def _receiver(self, call: Callable[[Any], None]) -> "Callback[Any]":
+        """Return a handler that Zenoh calls in a thread of its own."""
+        from zenoh.handlers import Callback
+
+        ended: Future[threading.Thread] = Future()
+        known = [e for e in self._receivers if not e.done() or e.result().is_alive()]
+        self._receivers = [*known, ended]
+        return Callback(call, lambda: ended.set_result(threading.current_thread()))
 
 
 _peers: dict[str, Peer] = {}
