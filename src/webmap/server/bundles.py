@@ -199,7 +199,7 @@ def _bundle(bundle: str, sources: Mapping[str, str], before: str) -> tuple[str, 
 
 
 def _in_page(text: str) -> str:
-    """Return a bundle as a script that is not a module, and removes its element."""
+    """Return a bundle as a script, not a module, that removes its own element."""
     lines = text.split("\n")
     kept = [line for line in lines if line and not line.startswith(("//", "export "))]
     here = "new URL(document.currentScript.dataset.from, location.href)"

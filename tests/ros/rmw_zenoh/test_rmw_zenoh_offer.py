@@ -126,9 +126,9 @@ def test_ten_thousand_tokens_come_and_go():
 def test_more_tokens_than_the_limit_are_left_out(monkeypatch):
     monkeypatch.setattr(offers, "MOST_ENDPOINTS", 3)
     offer = Offer()
-    remark, _, new = apply(offer, [odometry(i, topic=f"%o{i}") for i in range(5)])
-    assert isinstance(remark, Status)
-    assert remark.message == offers.TOO_MANY
+    status, _, new = apply(offer, [odometry(i, topic=f"%o{i}") for i in range(5)])
+    assert isinstance(status, Status)
+    assert status.message == offers.TOO_MANY
     assert len(new.channels) == 3
     changed(offer, [odometry(2, topic="%o2")])  # it is known already
     changed(offer, gone=[odometry(0, topic="%o0")])
@@ -171,10 +171,10 @@ def test_a_publisher_that_keeps_messages_makes_another_channel():
     assert changed(offer, [odometry(4), odometry(5, quality="1")]) == ([], [])
 
 
-def test_remarks_about_lying_tokens_are_few():
+def test_errors_about_invalid_tokens_are_few():
     found = apply(Offer(), [f"lie {i}" for i in range(1000)] + [odometry(1)])
-    remarks = [each for each in found if isinstance(each, Status)]
-    assert 1 < len(remarks) < 100
+    errors = [each for each in found if isinstance(each, Status)]
+    assert 1 < len(errors) < 100
     assert found[-1].channels
 
 
@@ -208,7 +208,7 @@ def test_of_a_message_that_is_too_long_the_length_is_sent():
 
 
 @pytest.mark.parametrize("wrong", [b"", bytes(32), bytes(34), attachment(length=15)])
-def test_a_message_with_another_attachment_becomes_a_remark(wrong):
+def test_a_message_with_another_attachment_becomes_an_error(wrong):
     event = receive(message_frame(3, "/odom", b"data", 4, wrong))
     assert isinstance(event, Status)
     assert event.level == 2

@@ -31,8 +31,8 @@ from webmap.ros.rmw_zenoh.offer import (
     Change,
     Offer,
     change_of,
+    error_status,
     message_frame,
-    remark,
 )
 from webmap.ros.sockets.connection import CLOSED_HERE, LOOK_PERIOD, BridgeConnection
 
@@ -294,7 +294,7 @@ class _Reader:
             waiting, self._waiting, self._size = self._waiting, deque(), 0
             dropped, self._dropped = self._dropped, False
         if dropped:
-            self._deliver(remark(f"{self._topic}: {LOSSY}"))
+            self._deliver(error_status(f"{self._topic}: {LOSSY}"))
         for frame in waiting:
             self._deliver(frame)
 

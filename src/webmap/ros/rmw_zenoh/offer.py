@@ -130,15 +130,15 @@ def change_of(token: str, *, came: bool) -> Change:
         return token, error
 
 
-def remark(text: str) -> bytes:
-    """Return the frame with an error for people."""
+def error_status(text: str) -> bytes:
+    """Return the status frame with an error for people."""
     return operation("status", level=ERROR, message=text)
 
 
 def message_frame(
     subscription: int, topic: str, payload: bytes, size: int, attachment: bytes
 ) -> bytes:
-    """Return the frame with a message, or with a remark if it is not one of rmw_zenoh.
+    """Return the frame with a message, or with an error if it is not one of rmw_zenoh.
 
     Args:
         subscription: The subscription that the message is for.
@@ -149,7 +149,7 @@ def message_frame(
 
     """
     if len(attachment) != _ATTACHMENT or attachment[16] != 16:
-        return remark(
+        return error_status(
             f"{topic}: got a message with an attachment of {len(attachment)} bytes, "
             f"expected {_ATTACHMENT}, as rmw_zenoh of ROS 2 Kilted sends: the sender "
             "is another program or an older rmw_zenoh"
@@ -189,7 +189,7 @@ class Offer:
                 self._endpoints[token] = found
             else:
                 faults[TOO_MANY] = None
-        yield from map(remark, itertools.islice(faults, MOST_STATUSES))
+        yield from map(error_status, itertools.islice(faults, MOST_STATUSES))
         yield from self._changed_channels()
 
     def _changed_channels(self) -> Iterator[bytes]:
